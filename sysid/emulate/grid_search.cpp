@@ -72,6 +72,21 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
   return result;
 }
 
+std::vector<Registration> registrations_of(const std::vector<Replay>& replays,
+                                           const std::vector<ReplayResult>& results,
+                                           const ScoreSettings& settings) {
+  std::vector<RegistrationProblem> problems;
+  std::vector<Registration> starts;
+  bool finite = true;
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    problems.push_back(registration_problem(replays[r], results[r].motion));
+    starts.push_back(problems.back().start);
+    finite = finite && results[r].finite;
+  }
+  if (!finite) return starts;
+  return find_registrations(problems, settings.objective, settings.registration, settings.shared);
+}
+
 namespace {
 
 /// Appends results in order of id as they come, and tells how far the search is.

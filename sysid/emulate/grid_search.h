@@ -48,6 +48,11 @@ ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettin
 CandidateResult score_motions(const std::vector<Replay>& replays, const std::vector<ReplayResult>& results,
                               const ScoreSettings& settings, const std::vector<CloudSearches>& searches = {});
 
+/// The registrations that score_motions finds, without the scores; of motions that diverged none is sought.
+std::vector<Registration> registrations_of(const std::vector<Replay>& replays,
+                                           const std::vector<ReplayResult>& results,
+                                           const ScoreSettings& settings);
+
 /// Simulates and scores every candidate of the grid that `store` does not hold yet and appends it there,
 /// `envs` candidates at a time, a batch a recording. Candidates that diverge or miss the
 /// tolerance are marked, never a reason to stop. Results are appended in order of id, so that the files do

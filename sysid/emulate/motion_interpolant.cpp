@@ -17,7 +17,8 @@ void for_each_block(const Motion& motion, const Use& use) {
 
 }  // namespace
 
-MotionInterpolant::MotionInterpolant(const std::vector<Axis>& axes, const std::vector<Motion>& motions)
+MotionInterpolant::MotionInterpolant(const std::vector<Axis>& axes, const std::vector<Motion>& motions,
+                                     int threads)
     : layout_(std::make_shared<const Motion>(motions.front())) {
   for (const Axis& axis : axes) {
     Eigen::VectorXd knots(static_cast<Eigen::Index>(axis.values.size()));
@@ -34,11 +35,11 @@ MotionInterpolant::MotionInterpolant(const std::vector<Axis>& axes, const std::v
   for (const data::Points& positions : layout_->positions) take(positions.size());
   take(static_cast<Eigen::Index>(3 * layout_->forces.size()));
   const auto points = std::make_shared<Eigen::MatrixXd>(size, static_cast<Eigen::Index>(motions.size()));
-  for (std::size_t c = 0; c < motions.size(); ++c) {
+  data::for_each_in_parallel(motions.size(), threads, [&](std::size_t c) {
     double* to = points->col(static_cast<Eigen::Index>(c)).data();
     for_each_block(motions[c],
                    [&](const double* from, Eigen::Index count) { to = std::copy(from, from + count, to); });
-  }
+  });
   points_ = points;
 }
 

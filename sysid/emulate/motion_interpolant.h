@@ -20,7 +20,7 @@ class MotionInterpolant {
  public:
   /// `motions`: one a point of the grid of `axes`, the last axis fastest; alike in steps and in which
   /// positions are empty.
-  MotionInterpolant(const std::vector<Axis>& axes, const std::vector<Motion>& motions);
+  MotionInterpolant(const std::vector<Axis>& axes, const std::vector<Motion>& motions, int threads = 1);
 
   std::size_t axes() const { return splines_.size(); }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/parallel.h"
+
 namespace flash::sysid {
 namespace {
 
@@ -24,10 +26,6 @@ double step_of(const Axis& axis, double value) {
   if (axis.logarithmic) return kLogStep;
   if (axis.values.size() > 1) return kRangeStep * (axis.values.back() - axis.values.front());
   return kRangeStep * std::max(std::abs(value), 0.1);
-}
-
-Registration registration_of(const Replay& replay, const RecordingScore& fit) {
-  return {fit.offset, fit.yaw, fit.time_offset, replay.pivot, replay.up};
 }
 
 }  // namespace
@@ -62,11 +60,10 @@ Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSe
   }
   if (std::any_of(result.motions.begin(), result.motions.end(), [](const auto& m) { return !m.finite; }))
     return result;
-  const CandidateResult score = score_motions(replays, result.motions, grid.score);
+  const std::vector<Registration> registrations = registrations_of(replays, result.motions, grid.score);
   Eigen::Index rows = 0, columns = 0;
   for (std::size_t r = 0; r < replays.size(); ++r) {
-    result.places.emplace_back(replays[r], result.motions[r].motion,
-                               registration_of(replays[r], score.recordings[r]), grid.score.objective);
+    result.places.emplace_back(replays[r], result.motions[r].motion, registrations[r], grid.score.objective);
     rows += result.places.back().rows();
   }
   result.parameters = Eigen::MatrixXd::Zero(rows, static_cast<Eigen::Index>(parameters));
@@ -75,11 +72,13 @@ Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSe
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const LinearObservations& places = result.places[r];
+    std::vector<Eigen::VectorXd> moved(runs[r].size());
+    data::for_each_in_parallel(moved.size(), grid.threads, [&](std::size_t i) {
+      if (i > 0) moved[i] = places.displacements(replays[r], runs[r][i].motion);
+    });
     for (std::size_t k = 0; k < parameters && differentiate; ++k)
       result.parameters.block(row, static_cast<Eigen::Index>(k), places.rows(), 1) =
-          share / spacing[k] *
-          (places.displacements(replays[r], runs[r][2 * k + 2].motion) -
-           places.displacements(replays[r], runs[r][2 * k + 1].motion));
+          share / spacing[k] * (moved[2 * k + 2] - moved[2 * k + 1]);
     const data::NuisanceBounds& bounds = replays[r].recording.nuisance;
     const Eigen::Matrix<double, Eigen::Dynamic, 5> derivatives = places.registration_derivatives();
     const double widths[5] = {bounds.offset.x(), bounds.offset.y(), bounds.offset.z(), bounds.yaw,

@@ -140,7 +140,7 @@ std::optional<MotionInterpolant> motion_interpolant(const Replay& replay, const 
                                                     const std::function<void()>& told) {
   const auto motions = motions_over(replay, grid.axes, grid, store, told);
   if (!motions) return std::nullopt;
-  return MotionInterpolant(grid.axes, *motions);
+  return MotionInterpolant(grid.axes, *motions, grid.threads);
 }
 
 std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Replay& fine,
@@ -155,7 +155,8 @@ std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Replay
   data::for_each_in_parallel(points.size(), replay.settings.threads, [&](std::size_t i) {
     add((*differences)[i], -1, prolonged(motions.at(points[i]), *matrix));
   });
-  return ModelledReplay{fine, TwoMeshMotions(motions, MotionInterpolant(axes, *differences), matrix)};
+  return ModelledReplay{fine,
+                        TwoMeshMotions(motions, MotionInterpolant(axes, *differences, grid.threads), matrix)};
 }
 
 }  // namespace flash::sysid

@@ -44,6 +44,19 @@ int most_rows_together(const ObservedRows& rows) {
   return most;
 }
 
+/// Of the matrix that was factored: the sum of squares of L^-1, whose columns are zero above the diagonal.
+double trace_of_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor) {
+  constexpr Eigen::Index kColumns = 32;  // at a time
+  const Eigen::MatrixXd& packed = factor.matrixLLT();
+  double sum = 0;
+  for (Eigen::Index left = packed.rows(); left > 0; left -= kColumns) {
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Identity(left, std::min(left, kColumns));
+    packed.bottomRightCorner(left, left).triangularView<Eigen::Lower>().solveInPlace(columns);
+    sum += columns.squaredNorm();
+  }
+  return sum;
+}
+
 /// log |I + v T| - v x^T (I + v T)^-1 x for a tridiagonal T without negative eigenvalues.
 double tridiagonal_deviance(const Eigen::VectorXd& diagonal, const Eigen::VectorXd& beside,
                             const Eigen::VectorXd& x, double v) {
@@ -89,7 +102,7 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
   modes_known_ = std::move(of_known.modes);
   known_known_ = std::move(of_known.known);
   estimate_noise(residuals);
-  const double between = noise_is_told_ ? noise_between_neighbours(rows_, residuals) : 0;
+  const double between = noise_is_told_ ? noise_between_neighbours(rows_, residuals, threads) : 0;
   misfit_.rough = noise_;
   misfit_.keyframes = keyframes_;
   misfit_.noise = between > 0 ? std::clamp(between, 1e-9, noise_) : noise_;
@@ -274,9 +287,7 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
     const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
     const Eigen::VectorXd x = products_with(flexible, sums), fitted = variance * factor.solve(x);
     const double left = squares_of(sums) - fitted.dot(x) - fitted.squaredNorm() / variance;
-    matrix.setIdentity();
-    factor.matrixL().solveInPlace(matrix);
-    const double freedom = rows - (coordinates - matrix.squaredNorm()) - count;
+    const double freedom = rows - (coordinates - trace_of_inverse(factor)) - count;
     if (round == 0 && freedom < 1 && most_rows_together(rows_) <= kFew) {
       const double of_known = (inverse_known_ * known_known_).trace();
       noise_ = std::max(left_ * std::sqrt(0.5 * rows / std::max(rows - of_known, 1.0)), 1e-9);

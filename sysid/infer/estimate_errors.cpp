@@ -60,6 +60,20 @@ std::vector<std::vector<double>> draws_of(const Posterior& posterior) {
   return draws;
 }
 
+/// Simulated motions, one a replay, at each of some values.
+std::vector<std::vector<ReplayResult>> simulated_at(const Task& task, const std::vector<Replay>& replays,
+                                                    const std::vector<std::vector<double>>& points) {
+  std::vector<ReplayCandidate> candidates;
+  for (const std::vector<double>& values : points) candidates.push_back(candidate_at(values, task.grid));
+  std::vector<std::vector<ReplayResult>> results(points.size(), std::vector<ReplayResult>(replays.size()));
+  for (std::size_t r = 0; r < replays.size(); ++r)
+    task.store.run(replays[r], candidates, [&](std::size_t i, ReplayResult result) {
+      results[i][r] = std::move(result);
+      task.tell_motion();
+    });
+  return results;
+}
+
 constexpr const char* half_step_name = "half_step";
 
 }  // namespace
@@ -157,13 +171,11 @@ std::vector<KnownError> errors_at_draws(const Task& task, const Emulator& emulat
                                       [](const KnownError& error) { return error.name == half_step_name; });
   const bool halved = half_step != estimate.errors.end();
   const std::vector<Replay>& replays = halved ? half_step->terms[1].motions->replays : task.replays;
-  for (const std::vector<double>& values : draws_of(posterior)) {
-    const ReplayCandidate candidate = candidate_at(values, task.grid);
-    Motions simulated{replays, {}};
-    for (const Replay& replay : replays) {
-      simulated.results.push_back(task.store.run(replay, candidate));
-      task.tell_motion();
-    }
+  const std::vector<std::vector<double>> draws = draws_of(posterior);
+  std::vector<std::vector<ReplayResult>> at_draws = simulated_at(task, replays, draws);
+  for (std::size_t draw = 0; draw < draws.size(); ++draw) {
+    const std::vector<double>& values = draws[draw];
+    Motions simulated{replays, std::move(at_draws[draw])};
     if (!all_finite(simulated.results)) continue;
     MotionChange missed = {
         {-share, std::make_shared<const Motions>(Motions{on_model, motions_at(emulator, values, own_mesh)})},

@@ -5,6 +5,8 @@
 #include <map>
 #include <string>
 
+#include "data/parallel.h"
+
 namespace flash::sysid {
 
 std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
@@ -113,26 +115,28 @@ bool misses_much(const Task& task, const Found& found) {
   constexpr double kMuch = 0.5;  // of a standard deviation
   const Posterior& posterior = found.look.posterior;
   const Sensitivity sensitivity = sensitivity_of(task, found);
-  using Shifts = std::map<std::string, double>;
-  const auto shifts_of = [&](const KnownError& error) {
-    return check_of(error, sensitivity, posterior.axes).shift;
-  };
-  const Shifts at_estimate = shifts_of(found.estimate.errors.front());
-  Shifts half_step;
-  for (const KnownError& error : found.estimate.errors)
-    if (error.name == "half_step") half_step = shifts_of(error);
-  std::vector<Shifts> at_draws;
+  std::vector<const KnownError*> errors = {&found.estimate.errors.front()};
   for (const KnownError& error : found.errors)
-    if (error.name.empty()) at_draws.push_back(shifts_of(error));
+    if (error.name.empty()) errors.push_back(&error);
+  const std::size_t of_emulator = errors.size();
+  for (const KnownError& error : found.estimate.errors)
+    if (error.name == "half_step") errors.push_back(&error);
+  std::vector<std::map<std::string, double>> shifts(errors.size());
+  data::for_each_in_parallel(errors.size(), task.grid.threads, [&](std::size_t e) {
+    const Motions &from = *errors[e]->terms[0].motions, &to = *errors[e]->terms[1].motions;
+    shifts[e] =
+        shift_between(sensitivity, from.replays, from.results, to.replays, to.results, posterior.axes);
+  });
   for (std::size_t k = 0; k < posterior.axes.size(); ++k) {
     if (posterior.axes[k].values.size() < 2) continue;
     const std::string& name = posterior.axes[k].name;
     const Eigen::VectorXd draws = posterior.samples.col(static_cast<Eigen::Index>(k));
     const double much = kMuch * std::sqrt((draws.array() - draws.mean()).square().mean());
     double sum = 0;
-    for (const Shifts& shifts : at_draws)  // which take half the step, where that is an error of its own
-      sum += std::pow(shifts.at(name) - (half_step.empty() ? 0 : half_step.at(name)), 2);
-    if (std::abs(at_estimate.at(name)) > much || sum > much * much * static_cast<double>(at_draws.size()))
+    // Draws take half the step, where that is an error of its own.
+    const double half_step = shifts.size() > of_emulator ? shifts.back().at(name) : 0;
+    for (std::size_t e = 1; e < of_emulator; ++e) sum += std::pow(shifts[e].at(name) - half_step, 2);
+    if (std::abs(shifts.front().at(name)) > much || sum > much * much * static_cast<double>(of_emulator - 1))
       return true;
   }
   return false;

@@ -13,12 +13,12 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                                    std::optional<double> repeatability, const std::vector<KnownError>& errors,
                                    const std::vector<MotionChange>& rates, std::size_t first) {
   constexpr int kPasses = 2;  // where the nuisance is linear: without known errors, then at those found
-  const CandidateResult score = score_motions(replays, reference, settings);
+  const std::vector<Registration> registrations = registrations_of(replays, reference, settings);
   const Robust& robust = settings.objective.robust;
   recordings_.resize(replays.size());
   data::for_each_in_parallel(replays.size(), replays.front().settings.threads, [&](std::size_t r) {
     const Replay& replay = replays[r];
-    const RecordingScore& fit = score.recordings[r];
+    const Registration& fit = registrations[r];
     Recording& recording = recordings_[r];
     recording.replay = replay;
     recording.objective = settings.objective;
@@ -26,17 +26,22 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
     recording.bounds << bounds.offset, bounds.yaw, bounds.time;
     recording.nuisance.registration << fit.offset, fit.yaw, fit.time_offset;
     recording.nuisance.errors = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(errors.size()));
-    for (const KnownError& error : errors) {
-      SheetShifts shifts = shifts_of(error.terms, first + r, replay, fit.time_offset);
-      if (error.corrects) add(recording.correction, 1, shifts);
-      // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
-      const double size = error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1;
-      recording.sizes.push_back(size);
-      add(recording.errors.emplace_back(), size, shifts);
-      recording.bends.emplace_back();
-      if (!error.bend.empty())
-        add(recording.bends.back(), size * size, shifts_of(error.bend, first + r, replay, fit.time_offset));
-    }
+    recording.errors.resize(errors.size());
+    recording.bends.resize(errors.size());
+    // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
+    for (const KnownError& error : errors)
+      recording.sizes.push_back(error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1);
+    std::vector<SheetShifts> corrections(errors.size());
+    data::for_each_in_parallel(errors.size(), replay.settings.threads, [&](std::size_t e) {
+      const double size = recording.sizes[e];
+      SheetShifts shifts = shifts_of(errors[e].terms, first + r, replay, fit.time_offset);
+      add(recording.errors[e], size, shifts);
+      if (errors[e].corrects) corrections[e] = std::move(shifts);
+      if (!errors[e].bend.empty())
+        add(recording.bends[e], size * size, shifts_of(errors[e].bend, first + r, replay, fit.time_offset));
+    });
+    for (const SheetShifts& shifts : corrections)
+      if (!shifts.empty()) add(recording.correction, 1, shifts);
     std::vector<const SheetShifts*> shapes = {&recording.correction};
     for (const SheetShifts& error : recording.errors) shapes.push_back(&error);
     for (std::size_t e = 0; e < errors.size(); ++e) {
@@ -84,9 +89,10 @@ void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
   }
   const auto columns_of = [&](const std::vector<SheetShifts>& all) {
     Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(all.size()));
-    for (std::size_t e = 0; e < all.size(); ++e)
+    data::for_each_in_parallel(all.size(), replay.settings.threads, [&](std::size_t e) {
       if (!all[e].empty())
         columns.col(static_cast<Eigen::Index>(e)) = of_rows.cwiseProduct(places.moved_by(replay, all[e]));
+    });
     return columns;
   };
   recording.registered = of_rows.asDiagonal() * places.registration_derivatives();

@@ -47,6 +47,21 @@ Eigen::VectorXd ranges_of(const std::vector<Axis>& axes) {
   return ranges;
 }
 
+std::map<std::string, double> shift_between(const Sensitivity& sensitivity,
+                                            const std::vector<Replay>& replays,
+                                            const std::vector<ReplayResult>& motions,
+                                            const std::vector<Replay>& finer,
+                                            const std::vector<ReplayResult>& finer_motions,
+                                            const std::vector<Axis>& axes) {
+  const Eigen::VectorXd shift =
+      explain(sensitivity,
+              displacements(sensitivity, finer, finer_motions) - displacements(sensitivity, replays, motions),
+              ranges_of(axes));
+  std::map<std::string, double> named;
+  for (std::size_t k = 0; k < axes.size(); ++k) named[axes[k].name] = shift[static_cast<Eigen::Index>(k)];
+  return named;
+}
+
 SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensitivity,
                               const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
                               const std::vector<Replay>& finer,
@@ -62,12 +77,7 @@ SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensit
       ++count;
     }
   found.surface_change_m = count > 0 ? sum / static_cast<double>(count) : 0;
-  const Eigen::VectorXd shift =
-      explain(sensitivity,
-              displacements(sensitivity, finer, finer_motions) - displacements(sensitivity, replays, motions),
-              ranges_of(axes));
-  for (std::size_t k = 0; k < axes.size(); ++k)
-    found.shift[axes[k].name] = shift[static_cast<Eigen::Index>(k)];
+  found.shift = shift_between(sensitivity, replays, motions, finer, finer_motions, axes);
   return found;
 }
 

@@ -36,6 +36,14 @@ struct FinerSolution {
 std::vector<FinerSolution> finer_solutions(std::vector<FinerSettings> settings,
                                            const ReplayCandidate& candidate, const MotionStore& store);
 
+/// The change of each parameter that explains how far `finer_motions` are from `motions`.
+std::map<std::string, double> shift_between(const Sensitivity& sensitivity,
+                                            const std::vector<Replay>& replays,
+                                            const std::vector<ReplayResult>& motions,
+                                            const std::vector<Replay>& finer,
+                                            const std::vector<ReplayResult>& finer_motions,
+                                            const std::vector<Axis>& axes);
+
 /// How far `finer_motions` are from `motions`, and the change of the parameters that explains it.
 /// `surface_change_m`: mean over the weighing keyframes of the mean distance from the vertices of the finer
 /// run to the surface of the other, before any registration.

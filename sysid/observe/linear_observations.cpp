@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/parallel.h"
+
 namespace flash::sysid {
 namespace {
 
@@ -37,49 +39,53 @@ SheetDistance sheet_of(const Replay& replay) {
 }
 
 void LinearObservations::add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
-                                  const Eigen::Isometry3d& simulated_from_observed,
-                                  const SheetDistance& sheet, const Replay& replay,
-                                  const data::Points& positions, const data::Points& velocities,
-                                  const LinearObservations* near) {
+                                  const Seen& seen, std::vector<Place>& places) {
   const Eigen::Index count = std::min(points.rows(), at_most);
   if (count == 0 || !(common.weight > 0)) return;
+  const data::TriangleMesh& mesh = seen.replay.surface;
   int hint = -1;
   for (Eigen::Index i = 0; i < count; ++i) {
     const Eigen::Index row = i * points.rows() / count;
-    const Eigen::Vector3d point = simulated_from_observed * points.row(row).transpose();
+    const Eigen::Vector3d point = seen.simulated_from_observed * points.row(row).transpose();
     Place place = common;
     place.mark = static_cast<std::size_t>(row);
     SurfacePoint nearest;
-    if (near != nullptr && places_.size() < near->places_.size())
-      hint = near->places_[places_.size()].triangle;
-    if (place.term == Term::surface) nearest = sheet.nearest(point, hint);
-    if (place.term == Term::border) nearest = sheet.nearest_on_border(point);
+    if (places.size() < seen.near.size()) hint = seen.near[places.size()].triangle;
+    if (place.term == Term::surface) nearest = seen.sheet.nearest(point, hint);
+    if (place.term == Term::border) nearest = seen.sheet.nearest_on_border(point);
     if (place.term == Term::mark)
-      nearest = sheet.mark(replay.observations[place.observation].marks[place.mark], point);
+      nearest = seen.sheet.mark(seen.replay.observations[place.observation].marks[place.mark], point);
     hint = nearest.triangle;
-    const Eigen::Vector3i corners = replay.surface.triangles.row(nearest.triangle);
+    const Eigen::Vector3i corners = mesh.triangles.row(nearest.triangle);
     place.triangle = nearest.triangle;
     place.barycentric = nearest.barycentric;
     place.position = nearest.position;
-    place.velocity = at(velocities, corners, nearest.barycentric);
-    place.rest = at(replay.surface.vertices, corners, nearest.barycentric);
+    place.velocity = at(seen.velocities, corners, nearest.barycentric);
+    place.rest = at(mesh.vertices, corners, nearest.barycentric);
     const bool mark = place.term == Term::mark;
     if (mark) {
-      place.corners = corners_of(positions, replay.surface.triangles, nearest.triangle);
-      place.velocity = mark_shift(replay.observations[place.observation].marks[place.mark], place.corners,
-                                  corners_of(velocities, replay.surface.triangles, nearest.triangle));
+      place.corners = corners_of(seen.positions, mesh.triangles, nearest.triangle);
+      place.velocity =
+          mark_shift(seen.replay.observations[place.observation].marks[place.mark], place.corners,
+                     corners_of(seen.velocities, mesh.triangles, nearest.triangle));
     }
     place.weight = std::sqrt(common.weight / static_cast<double>(count));
     for (int k = 0; k < (mark ? 3 : 1); ++k) {
       place.direction = mark ? Eigen::Vector3d(Eigen::Vector3d::Unit(k))
                         : place.term == Term::surface
-                            ? normal_of(positions, corners)
-                            : border_normal(positions, corners, nearest.barycentric);
+                            ? normal_of(seen.positions, corners)
+                            : border_normal(seen.positions, corners, nearest.barycentric);
       place.residual = place.direction.dot(point - place.position);
       place.axis = k;
-      places_.push_back(place);
+      places.push_back(place);
     }
   }
+}
+
+std::span<const LinearObservations::Place> LinearObservations::places_of_keyframe(
+    std::size_t observation) const {
+  const auto found = std::ranges::equal_range(places_, observation, {}, &Place::observation);
+  return {found.begin(), found.end()};
 }
 
 LinearObservations::LinearObservations(const Replay& replay, const Motion& motion,
@@ -87,17 +93,22 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
                                        const SheetShifts& shifts, const LinearObservations* near,
                                        Eigen::Index points_per_term)
     : registration_(registration) {
-  SheetDistance sheet = sheet_of(replay);
-  if (near != nullptr) places_.reserve(near->places_.size());
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
   double total = 0;
-  for (const Observation& observation : replay.observations)
-    if (observation.seen()) total += observation.weight;
-  data::Points positions, velocities;
+  std::vector<std::size_t> weighing;
   for (std::size_t k = 0; k < replay.observations.size(); ++k) {
     const Observation& observation = replay.observations[k];
-    if (!observation.seen() || observation.weight <= 0) continue;
+    if (!observation.seen()) continue;
+    total += observation.weight;
+    if (observation.weight > 0) weighing.push_back(k);
+  }
+  std::vector<std::vector<Place>> of_keyframes(weighing.size());
+  const auto add_keyframe = [&](std::size_t i, SheetDistance& sheet) {
+    const std::size_t k = weighing[i];
+    const Observation& observation = replay.observations[k];
+    std::vector<Place>& places = of_keyframes[i];
     const double t = observation.t + registration.time_offset;
+    data::Points positions, velocities;
     surface_at(motion, t, positions, &velocities);
     if (!shifts.empty()) positions += shifts[k].positions;
     sheet.move(positions);
@@ -109,14 +120,19 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
       place.weight = observation.weight / total * weight;
       return place;
     };
+    const Seen seen{replay,
+                    sheet,
+                    positions,
+                    velocities,
+                    simulated_from_observed,
+                    near != nullptr ? near->places_of_keyframe(k) : std::span<const Place>()};
     const auto add = [&](const data::Points& points, Term term, double weight) {
-      add_term(points, points_per_term, common(term, weight), simulated_from_observed, sheet, replay,
-               positions, velocities, near);
+      add_term(points, points_per_term, common(term, weight), seen, places);
     };
     add(observation.points, Term::surface, weights[0]);
     add(observation.contour, Term::border, weights[1]);
     add(observation.markers, Term::mark, weights[2]);
-    if (!observation.force || !(weights[3] > 0)) continue;
+    if (!observation.force || !(weights[3] > 0)) return;
     Place place = common(Term::force, weights[3]);
     place.position = force_at(motion, t);
     if (!shifts.empty()) place.position += shifts[k].force;
@@ -127,9 +143,18 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
       place.direction = Eigen::Vector3d::Unit(axis);
       place.residual = place.direction.dot(*observation.force - place.position);
       place.axis = axis;
-      places_.push_back(place);
+      places.push_back(place);
     }
-  }
+  };
+  // A hierarchy takes about as long to copy as to move: each thread has one, for as many keyframes.
+  const std::size_t count = weighing.size(),
+                    parts = std::clamp<std::size_t>(count, 1, std::max(replay.settings.threads, 1));
+  data::for_each_in_parallel(parts, replay.settings.threads, [&](std::size_t part) {
+    SheetDistance sheet = sheet_of(replay);
+    for (std::size_t i = part * count / parts; i < (part + 1) * count / parts; ++i) add_keyframe(i, sheet);
+  });
+  for (const std::vector<Place>& places : of_keyframes)
+    places_.insert(places_.end(), places.begin(), places.end());
 }
 
 LinearObservations::Row LinearObservations::row(Eigen::Index i) const {

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "sysid/observe/score.h"
@@ -22,7 +23,8 @@ class LinearObservations {
  public:
   /// `replay`: of `motion`; its observations count. `shifts`: of the motion, where there are any.
   /// `near`: the same observations on a motion close by; where they belong there is where they are looked for
-  /// first. It changes speed only. `points_per_term`: of a keyframe, evenly thinned.
+  /// first. It changes speed only. `points_per_term`: of a keyframe, evenly thinned. Keyframes are shared out
+  /// over the replay's threads.
   LinearObservations(const Replay& replay, const Motion& motion, const Registration& registration,
                      const Objective& objective, const SheetShifts& shifts = {},
                      const LinearObservations* near = nullptr, Eigen::Index points_per_term = 200);
@@ -80,10 +82,18 @@ class LinearObservations {
     Eigen::Vector3d velocity;   // of the sheet there [m/s]
     Eigen::Matrix3d corners;    // of a mark: those of its triangle [m]
   };
-  void add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
-                const Eigen::Isometry3d& simulated_from_observed, const SheetDistance& sheet,
-                const Replay& replay, const data::Points& positions, const data::Points& velocities,
-                const LinearObservations* near);
+  /// One keyframe, with the motion that it is seen against.
+  struct Seen {
+    const Replay& replay;
+    const SheetDistance& sheet;  // there
+    const data::Points &positions, &velocities;
+    Eigen::Isometry3d simulated_from_observed;
+    std::span<const Place> near;  // its places on a motion close by
+  };
+  /// Appends the places of one term of a keyframe.
+  static void add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
+                       const Seen& seen, std::vector<Place>& places);
+  std::span<const Place> places_of_keyframe(std::size_t observation) const;
 
   std::vector<Place> places_;
   Registration registration_;

@@ -213,12 +213,14 @@ double minimize(std::vector<Side>& sides, const Eigen::VectorXd& widths, const O
   return here.score;
 }
 
-}  // namespace
+/// All problems, what is free of them, and where they fit best.
+struct Registered {
+  std::vector<Side> sides;
+  Eigen::VectorXd box, best;
+};
 
-std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProblem>& problems,
-                                              const Objective& objective,
-                                              const RegistrationSettings& settings,
-                                              const SharedRegistration& shared) {
+Registered registered(const std::vector<RegistrationProblem>& problems, const Objective& objective,
+                      const RegistrationSettings& settings, const SharedRegistration& shared) {
   const bool is_shared[kParameters] = {shared.offset, shared.offset, shared.offset, shared.yaw, shared.time};
   std::vector<Side> sides;
   sides.reserve(problems.size());
@@ -256,7 +258,25 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
       best = unknowns;
     }
   }
+  return {std::move(sides), box, best};
+}
 
+}  // namespace
+
+std::vector<Registration> find_registrations(const std::vector<RegistrationProblem>& problems,
+                                             const Objective& objective, const RegistrationSettings& settings,
+                                             const SharedRegistration& shared) {
+  const Registered found = registered(problems, objective, settings, shared);
+  std::vector<Registration> registrations;
+  for (const Side& side : found.sides) registrations.push_back(side.at(found.best));
+  return registrations;
+}
+
+std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProblem>& problems,
+                                              const Objective& objective,
+                                              const RegistrationSettings& settings,
+                                              const SharedRegistration& shared) {
+  auto [sides, box, best] = registered(problems, objective, settings, shared);
   std::vector<RegistrationFit> fits;
   for (Side& side : sides) {
     RegistrationFit& fit = fits.emplace_back();

@@ -62,4 +62,10 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
                                               const RegistrationSettings& settings = {},
                                               const SharedRegistration& shared = {});
 
+/// The registrations alone, without the scores of all points.
+std::vector<Registration> find_registrations(const std::vector<RegistrationProblem>& problems,
+                                             const Objective& objective,
+                                             const RegistrationSettings& settings = {},
+                                             const SharedRegistration& shared = {});
+
 }  // namespace flash::sysid

@@ -25,12 +25,13 @@ TEST(MotionInterpolant, IsExactForMotionsCubicInTheCoordinates) {
   };
   std::vector<Motion> motions;
   for (const std::vector<double>& point : cartesian_product(axes)) motions.push_back(motion_at(point));
-  const MotionInterpolant surface(axes, motions);
+  const MotionInterpolant surface(axes, motions), by_four_threads(axes, motions, 4);
   for (const std::vector<double>& point : std::vector<std::vector<double>>{
            {0.33, 2.2e-5, 0.3}, {0.1, 1e-3, 0.3}, {0.88, 1.7e-4, 0.3}, {0.2, 4e-5, 0.3}}) {
     const Motion found = surface.at(point), expected = motion_at(point);
     ASSERT_EQ(found.positions.size(), 3u);
     EXPECT_EQ(found.positions[1].rows(), 0);
+    EXPECT_EQ(by_four_threads.at(point).positions, found.positions);
     for (const int i : {0, 2}) EXPECT_LT((found.positions[i] - expected.positions[i]).norm(), 1e-10);
     for (const int i : {0, 1}) EXPECT_LT((found.forces[i] - expected.forces[i]).norm(), 1e-10);
   }

@@ -23,6 +23,28 @@ AnswerSettings without_horizon() {
   return settings;
 }
 
+TEST(Answer, IsTheSameOnAnyThreads) {
+  const data::TemporaryFolder folder;
+  GridSettings grid = bending_grid();
+  grid.axes.push_back(parse_axis("friction", "0.1:0.6:4"));
+  grid.rollouts = folder / "rollouts";
+  std::vector<Replay> replays = {short_lift(folder, "sheet:0.2x0.05:0.0125")};
+  ResultsStore store(folder / "run", grid.axes, {"lift"}, {}, Existing::refuse);
+  ASSERT_TRUE(grid_search(replays, grid, store));
+  AnswerSettings asked = without_horizon();
+  asked.solver_check = false;
+  const auto answer = [&](int threads) {
+    GridResults results = store.results();
+    grid.threads = replays[0].settings.threads = threads;
+    return find_answer(results, replays, grid, asked);
+  };
+  const Answer one = answer(1), four = answer(4);
+  EXPECT_EQ(one.values, four.values);
+  EXPECT_EQ(one.samples, four.samples);
+  EXPECT_EQ(one.estimate.score, four.estimate.score);
+  EXPECT_EQ(one.open_information, four.open_information);
+}
+
 TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   const data::TemporaryFolder folder;
   std::vector<Replay> replays = {short_lift(folder, "sheet:0.2x0.05:0.0041666667:alternating_by_row")};

@@ -85,6 +85,8 @@ TEST(Discrepancy, IsTheSameOnAnyThreads) {
   for (std::size_t shape = 0; shape < one.shapes().size(); ++shape)
     EXPECT_EQ(one.deviance_at(y, shape, 2e-3), four.deviance_at(y, shape, 2e-3));
   EXPECT_EQ(one.misfit().size, four.misfit().size);
+  EXPECT_EQ(one.misfit().noise, four.misfit().noise);
+  EXPECT_EQ(one.covariance_of(rows.rates), four.covariance_of(rows.rates));
 }
 
 TEST(Discrepancy, LikelihoodIsThatOfTheDenseCovariance) {
@@ -166,6 +168,7 @@ TEST(Discrepancy, NeighboursTellTheNoiseWhateverIsMissed) {
   // Neighbours are 3.4 mm apart: the smooth part differs by 10 sin(20 * 0.0034) = 0.7 of the noise at most,
   // half that in the mean square, and 1020 differences tell a median to 4 %.
   EXPECT_NEAR(noise_between_neighbours(rows, y), kNoise, 0.2 * kNoise);
+  EXPECT_EQ(noise_between_neighbours(rows, y, 4), noise_between_neighbours(rows, y));
 }
 
 /// Mean and spread of a shift along `rate`, by quadrature over the likelihood.

@@ -92,6 +92,21 @@ TEST(MotionLikelihood, AnErrorOfKnownShapeIsTakenOutHoweverLarge) {
   EXPECT_LT(likelihood.spread_of(0), 0.01);
 }
 
+TEST(MotionLikelihood, IsTheSameOnAnyThreads) {
+  Cloth cloth(12);
+  cloth.see(cloth.bulged(0.03));
+  KnownError bulge{from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.02))};
+  bulge.bend = from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.01));
+  KnownError correction{from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.001)), true, true};
+  const auto deviance = [&](int threads) {
+    cloth.replay.settings.threads = threads;
+    const MotionLikelihood likelihood({cloth.replay}, result_of(cloth.bulged(0)), {}, {}, {bulge, correction},
+                                      {from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.005))});
+    return likelihood.deviance({cloth.bulged(0.01)});
+  };
+  EXPECT_EQ(deviance(1), deviance(4));
+}
+
 TEST(MotionLikelihood, AnErrorThatBendsIsFollowedAlongItsCurve) {
   Cloth cloth(12);
   cloth.see(cloth.bulged(0.03 + 0.02));

@@ -40,6 +40,9 @@ TEST(SolverCheck, ExplainsAMotionByTheParameters) {
       compare_solutions("", sensitivity, replays, sensitivity.motions, replays, other, grid.axes);
   // What is not linear over 10 % is a few per cent of 5 %.
   EXPECT_NEAR(found.shift.at("bending"), std::log(1.05), 0.005);
+  GridSettings by_four_threads = grid;
+  by_four_threads.threads = 4;
+  EXPECT_EQ(measure_sensitivity(replays, by_four_threads, {2e-4}).parameters, sensitivity.parameters);
 }
 
 }  // namespace

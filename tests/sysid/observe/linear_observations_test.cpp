@@ -82,6 +82,20 @@ TEST(LinearObservations, DistancesOnAnotherMotionAreThoseOfItsOwnRows) {
   }
 }
 
+TEST(LinearObservations, AreTheSameOnAnyThreads) {
+  SeenSheet seen(5);
+  const Registration registration{{0.001, 0, 0.002}, 0.01, 0.004, seen.replay.pivot, seen.replay.up};
+  const LinearObservations one(seen.replay, seen.motion, registration, {});
+  seen.replay.settings.threads = 4;
+  const LinearObservations four(seen.replay, seen.motion, registration, {}),
+      again(seen.replay, seen.motion, registration, {}, {}, &one);
+  EXPECT_EQ(one.rows_of_keyframes(), four.rows_of_keyframes());
+  for (const LinearObservations* const other : {&four, &again}) {
+    EXPECT_EQ(one.residuals(), other->residuals());
+    EXPECT_EQ(one.registration_derivatives(), other->registration_derivatives());
+  }
+}
+
 // A flat sheet at rest and points 3 mm above it: 3 mm, and 5 mm where the sheet is shifted down by 2 mm.
 TEST(LinearObservations, DistancesAreSignedAlongTheNormal) {
   Replay replay;

@@ -63,6 +63,10 @@ TEST(Registration, FindsOffsetYawAndTimeOfCleanPoints) {
   EXPECT_NEAR(fit.registration.time_offset, truth.time_offset, 3e-4);
   EXPECT_LT(fit.score, 3e-5);
   EXPECT_TRUE(fit.bounds_hit.empty());
+  const Registration alone = find_registrations({problem_of(mesh, motion, observations, truth)}, {}).front();
+  EXPECT_EQ(alone.offset, fit.registration.offset);
+  EXPECT_EQ(alone.yaw, fit.registration.yaw);
+  EXPECT_EQ(alone.time_offset, fit.registration.time_offset);
 }
 
 TEST(Registration, NoiseAndStrayPointsMoveItLittle) {
