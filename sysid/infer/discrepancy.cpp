@@ -92,13 +92,13 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
     rows_of_[static_cast<std::size_t>(rows_.keyframe[i] * channels_ + rows_.channel[i])].push_back(
         static_cast<Eigen::Index>(i));
   modes_modes_.assign(static_cast<std::size_t>(channels_), Eigen::MatrixXd(keyframes_, modes_ * modes_));
-  for (std::size_t b = 0; b < rows_of_.size(); ++b) {
+  data::for_each_in_parallel(rows_of_.size(), threads, [&](std::size_t b) {
     const Eigen::MatrixXd modes = along_.values(rows_of_[b], Eigen::all),
                           squares = modes.transpose() * rows_.weights(rows_of_[b]).asDiagonal() * modes;
     modes_modes_[b % modes_modes_.size()].row(static_cast<Eigen::Index>(b / modes_modes_.size())) =
         squares.reshaped().transpose();
-  }
-  Sums of_known = sums(known_);
+  });
+  Sums of_known = sums(known_, threads);
   modes_known_ = std::move(of_known.modes);
   known_known_ = std::move(of_known.known);
   estimate_noise(residuals);
@@ -166,18 +166,19 @@ Eigen::MatrixXd DiscrepancyModel::covariance(std::size_t shape) const {
   return covariance;
 }
 
-Eigen::MatrixXd DiscrepancyModel::by_modes(const Eigen::MatrixXd& columns) const {
+Eigen::MatrixXd DiscrepancyModel::by_modes(const Eigen::MatrixXd& columns, int threads) const {
   Eigen::MatrixXd sums(block(keyframes_, 0, channels_, modes_), columns.cols());
-  for (std::size_t b = 0; b < rows_of_.size(); ++b)
+  data::for_each_in_parallel(rows_of_.size(), threads, [&](std::size_t b) {
     sums.middleRows(static_cast<Eigen::Index>(b) * modes_, modes_) =
         Eigen::MatrixXd(along_.values(rows_of_[b], Eigen::all)).transpose() *
         Eigen::MatrixXd(columns(rows_of_[b], Eigen::all));
+  });
   return sums;
 }
 
-DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals) const {
+DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals, int threads) const {
   const Eigen::MatrixXd weighed = rows_.weights.asDiagonal() * residuals;
-  return {by_modes(weighed), known_.transpose() * weighed,
+  return {by_modes(weighed, threads), known_.transpose() * weighed,
           weighed.cwiseProduct(residuals).colwise().sum().transpose()};
 }
 

@@ -101,9 +101,9 @@ class DiscrepancyModel {
     Eigen::MatrixXd squares;          ///< lower half of their products with each other, over the rows
     Eigen::MatrixXd known;            ///< their products with the errors of known shape
   };
-  Sums sums(const Eigen::MatrixXd& residuals) const;
+  Sums sums(const Eigen::MatrixXd& residuals, int threads = 1) const;
   /// Of columns, a row a row: their products with the modes, stacked as in Sums.
-  Eigen::MatrixXd by_modes(const Eigen::MatrixXd& columns) const;
+  Eigen::MatrixXd by_modes(const Eigen::MatrixXd& columns, int threads = 1) const;
   /// Where the keyframes have a mode along the sheet of a channel, in what is stacked as in Sums.
   auto of_mode(int channel, Eigen::Index mode) const {
     return Eigen::seqN(channel * modes_ + mode, keyframes_, channels_ * modes_);

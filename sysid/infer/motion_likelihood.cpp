@@ -49,7 +49,7 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
       shapes.push_back(&recording.bends[e]);
       recording.bent.push_back(static_cast<Eigen::Index>(e));
     }
-    recording.shapes = side_by_side(shapes);
+    recording.shapes = side_by_side(shapes, replay.settings.threads);
     std::vector<SheetShifts> by_parameter;
     for (const MotionChange& rate : rates)
       by_parameter.push_back(shifts_of(rate, r, replay, fit.time_offset));
@@ -58,9 +58,11 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                 robust.kind == RobustKind::huber ? std::optional<double>(robust.huber_delta) : std::nullopt);
       if (errors.empty()) break;
       if (pass + 1 < kPasses)
-        recording.nuisance = fit_nuisance(recording, recording.nuisance, [&](double) -> const Motion& {
-                               return reference[r].motion;
-                             }).first;
+        recording.nuisance =
+            fit_nuisance(
+                recording, recording.nuisance, [&](double) -> const Motion& { return reference[r].motion; },
+                replay.settings.threads)
+                .first;
     }
     // From here on their shapes side by side do.
     recording.errors = recording.bends = {};
@@ -145,7 +147,7 @@ void MotionLikelihood::set_shifts(const Recording& recording, const Nuisance& nu
 
 std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     const Recording& recording, const Nuisance& start,
-    const std::function<const Motion&(double time_offset)>& motion_at) {
+    const std::function<const Motion&(double time_offset)>& motion_at, int threads) {
   constexpr int kSteps = 30;
   // Of s: what a last step may move all rows by, a quarter of a unit of deviance. With steps that moved them
   // by seven the intervals of equal searches by two routes differed by 12 %, now by 6 %.
@@ -172,7 +174,7 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     if (read) {
       set_shifts(recording, next, shifts);
       residuals = recording.linear.scale.cwiseProduct(recording.near->distances(
-          recording.replay, motion, registration_of(recording, next), shifts, sheet, triangles));
+          recording.replay, motion, registration_of(recording, next), shifts, sheet, triangles, threads));
       there = recording.likelihood->deviance_of(
           residuals, next.registration.cwiseQuotient(recording.bounds.cwiseMax(1e-300)), next.errors);
     }
@@ -208,13 +210,14 @@ double MotionLikelihood::asked_of(std::size_t error) const {
   return sum / static_cast<double>(recordings_.size());
 }
 
-double MotionLikelihood::deviance(const MotionAtClock& motions, std::vector<Nuisance>& fitted) const {
+double MotionLikelihood::deviance(const MotionAtClock& motions, std::vector<Nuisance>& fitted,
+                                  int threads) const {
   double sum = 0;
   std::vector<Nuisance> found;
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
-    auto [nuisance, deviance] =
-        fit_nuisance(recordings_[r], fitted.empty() ? recordings_[r].nuisance : fitted[r],
-                     [&](double time_offset) -> const Motion& { return motions(r, time_offset); });
+    auto [nuisance, deviance] = fit_nuisance(
+        recordings_[r], fitted.empty() ? recordings_[r].nuisance : fitted[r],
+        [&](double time_offset) -> const Motion& { return motions(r, time_offset); }, threads);
     found.push_back(std::move(nuisance));
     sum += deviance;
   }
@@ -227,8 +230,9 @@ double MotionLikelihood::deviance(const MotionAtClock& motions) const {
   return deviance(motions, fitted);
 }
 
-double MotionLikelihood::deviance(const std::vector<Motion>& motions) const {
-  return deviance([&](std::size_t r, double) -> const Motion& { return motions[r]; });
+double MotionLikelihood::deviance(const std::vector<Motion>& motions, int threads) const {
+  std::vector<Nuisance> fitted;
+  return deviance([&](std::size_t r, double) -> const Motion& { return motions[r]; }, fitted, threads);
 }
 
 }  // namespace flash::sysid

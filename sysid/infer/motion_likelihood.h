@@ -28,7 +28,7 @@ class MotionLikelihood {
 
   /// -2 log likelihood of motions, one a recording, up to a constant. NaN where the clock that fits one leads
   /// to steps that it lacks.
-  double deviance(const std::vector<Motion>& motions) const;
+  double deviance(const std::vector<Motion>& motions, int threads = 1) const;
 
   /// The motion of recording r with the positions that its keyframes read where its clock is off by
   /// `time_offset` [s].
@@ -42,7 +42,7 @@ class MotionLikelihood {
   };
   /// `fitted`: one a recording: where it is looked for first, unless empty; then what was found. Near what is
   /// found it changes speed only.
-  double deviance(const MotionAtClock& motions, std::vector<Nuisance>& fitted) const;
+  double deviance(const MotionAtClock& motions, std::vector<Nuisance>& fitted, int threads = 1) const;
 
   /// How well the recording that tells most tells a known error beside the parameters, in its standard
   /// deviations.
@@ -98,7 +98,7 @@ class MotionLikelihood {
   /// The likeliest nuisance of a motion, by Gauss and Newton, and its -2 log likelihood.
   static std::pair<Nuisance, double> fit_nuisance(
       const Recording& recording, const Nuisance& start,
-      const std::function<const Motion&(double time_offset)>& motion_at);
+      const std::function<const Motion&(double time_offset)>& motion_at, int threads);
 
   std::vector<Recording> recordings_;
 };

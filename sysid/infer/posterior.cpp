@@ -142,9 +142,10 @@ Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd
   }
   Eigen::VectorXd x = posterior.estimate;
   const auto log_density = [&](const Eigen::VectorXd& moved) {
-    x(free) = moved;
-    for (const Eigen::Index k : free) {
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      const Eigen::Index k = free[i];
       const Eigen::VectorXd& knots = spline.knots(k);
+      x[k] = moved[static_cast<Eigen::Index>(i)];
       if (x[k] < knots[0] || x[k] > knots[knots.size() - 1]) return -std::numeric_limits<double>::infinity();
     }
     return -0.5 * spline(x);

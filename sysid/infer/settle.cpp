@@ -47,6 +47,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   constexpr double kUnlikely = 9;
   constexpr double kLikely = 3.84;  // as verdicts have it
   constexpr double kFarther = 1.3;  // of a distance
+  const int threads = task.grid.threads;
   const std::vector<Replay> on_model = replays_of(found.emulator);
   const std::vector<double> mode = found.look.posterior.values();
   std::vector<ReplayResult> own;
@@ -59,7 +60,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   const std::vector<Motion> at_mode = motions_in(mode_there);
   std::vector<MotionLikelihood::Nuisance> fitted;
   const double of_mode = likelihood.deviance(
-                   [&](std::size_t r, double) -> const Motion& { return at_mode[r]; }, fitted),
+                   [&](std::size_t r, double) -> const Motion& { return at_mode[r]; }, fitted, threads),
                fall = std::isnan(of_mode) ? INFINITY : std::max(0.0, of_mode - of_points.minCoeff());
 
   // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
@@ -72,7 +73,8 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   std::vector<ReplayResult> of_best;
   for (const Replay& replay : task.replays)
     of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)));
-  const double fall_to_best = on_own.deviance(motions_in(own)) - on_own.deviance(motions_in(of_best));
+  const double fall_to_best =
+      on_own.deviance(motions_in(own), threads) - on_own.deviance(motions_in(of_best), threads);
   Extent at_best;
   for (const double value : best) at_best.push_back({value, value});
   if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
@@ -86,7 +88,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
     for (std::size_t r = 0; r < own.size(); ++r)
       mode_on_own.push_back(found.emulator.models[r].model.on_its_mesh(own[r].motion));
     const bool by_extrapolation_alone =
-        better > -kFails && !(likelihood.deviance(mode_on_own) - on_own_mesh < kUnlikely);
+        better > -kFails && !(likelihood.deviance(mode_on_own, threads) - on_own_mesh < kUnlikely);
     if (better > kFails || by_extrapolation_alone || ask_for_own_mesh(found, held, likelihood, fitted))
       return Settled::on_own_mesh;
   }

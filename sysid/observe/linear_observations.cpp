@@ -31,6 +31,15 @@ Eigen::Vector3d border_normal(const data::Points& positions, const Eigen::Vector
   return (b - a).cross(normal_of(positions, corners)).normalized();
 }
 
+/// Calls work(first, last) for as many parts of `count` keyframes as there are threads: a hierarchy takes
+/// about as long to copy as to move, so each thread has one.
+template <class Work>
+void for_each_part(std::size_t count, int threads, const Work& work) {
+  const auto parts = std::clamp<std::size_t>(count, 1, static_cast<std::size_t>(std::max(threads, 1)));
+  data::for_each_in_parallel(
+      parts, threads, [&](std::size_t part) { work(part * count / parts, (part + 1) * count / parts); });
+}
+
 }  // namespace
 
 SheetDistance sheet_of(const Replay& replay) {
@@ -84,8 +93,12 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
 
 std::span<const LinearObservations::Place> LinearObservations::places_of_keyframe(
     std::size_t observation) const {
-  const auto found = std::ranges::equal_range(places_, observation, {}, &Place::observation);
-  return {found.begin(), found.end()};
+  const auto first =
+      std::lower_bound(places_.begin(), places_.end(), observation,
+                       [](const Place& place, std::size_t k) { return place.observation < k; });
+  const auto last = std::find_if(first, places_.end(),
+                                 [&](const Place& place) { return place.observation != observation; });
+  return {places_.data() + (first - places_.begin()), static_cast<std::size_t>(last - first)};
 }
 
 LinearObservations::LinearObservations(const Replay& replay, const Motion& motion,
@@ -146,12 +159,9 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
       places.push_back(place);
     }
   };
-  // A hierarchy takes about as long to copy as to move: each thread has one, for as many keyframes.
-  const std::size_t count = weighing.size(),
-                    parts = std::clamp<std::size_t>(count, 1, std::max(replay.settings.threads, 1));
-  data::for_each_in_parallel(parts, replay.settings.threads, [&](std::size_t part) {
+  for_each_part(weighing.size(), replay.settings.threads, [&](std::size_t first, std::size_t last) {
     SheetDistance sheet = sheet_of(replay);
-    for (std::size_t i = part * count / parts; i < (part + 1) * count / parts; ++i) add_keyframe(i, sheet);
+    for (std::size_t i = first; i < last; ++i) add_keyframe(i, sheet);
   });
   for (const std::vector<Place>& places : of_keyframes)
     places_.insert(places_.end(), places.begin(), places.end());
@@ -182,52 +192,66 @@ Eigen::VectorXd LinearObservations::residuals() const {
 
 Eigen::VectorXd LinearObservations::distances(const Replay& replay, const Motion& motion,
                                               const Registration& registration, const SheetShifts& shifts,
-                                              SheetDistance& sheet, std::vector<int>& triangles) const {
+                                              SheetDistance& sheet, std::vector<int>& triangles,
+                                              int threads) const {
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
   const data::Triangles& corners = replay.surface.triangles;
   Eigen::VectorXd rows(this->rows());
   if (triangles.empty())
     for (const Place& place : places_) triangles.push_back(place.triangle);
-  data::Points positions;
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  std::size_t current = static_cast<std::size_t>(-1);
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    const Place& place = places_[i];
-    const Observation& observation = replay.observations[place.observation];
-    if (place.observation != current) {
-      current = place.observation;
-      const double t = observation.t + registration.time_offset;
-      surface_at(motion, t, positions);
-      force = force_at(motion, t);
-      if (!shifts.empty()) {
-        positions += shifts[current].positions;
-        force += shifts[current].force;
+  const auto measure = [&](std::size_t first, std::size_t last, SheetDistance& there) {
+    data::Points positions;
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    std::size_t current = static_cast<std::size_t>(-1);
+    for (std::size_t i = first; i < last; ++i) {
+      const Place& place = places_[i];
+      const Observation& observation = replay.observations[place.observation];
+      if (place.observation != current) {
+        current = place.observation;
+        const double t = observation.t + registration.time_offset;
+        surface_at(motion, t, positions);
+        force = force_at(motion, t);
+        if (!shifts.empty()) {
+          positions += shifts[current].positions;
+          force += shifts[current].force;
+        }
+        there.move(positions);
       }
-      sheet.move(positions);
+      double& distance = rows[static_cast<Eigen::Index>(i)];
+      if (place.term == Term::force) {
+        distance = (*observation.force - force)[place.axis];
+        continue;
+      }
+      const auto point = [&](const data::Points& points) {
+        return Eigen::Vector3d(simulated_from_observed *
+                               points.row(static_cast<Eigen::Index>(place.mark)).transpose());
+      };
+      if (place.term == Term::mark) {
+        const Eigen::Vector3d seen = point(observation.markers);
+        distance = (seen - there.mark(observation.marks[place.mark], seen).position)[place.axis];
+        continue;
+      }
+      const bool border = place.term == Term::border;
+      const Eigen::Vector3d seen = point(border ? observation.contour : observation.points);
+      const SurfacePoint nearest = border ? there.nearest_on_border(seen) : there.nearest(seen, triangles[i]);
+      triangles[i] = nearest.triangle;
+      const Eigen::Vector3i at_corners = corners.row(nearest.triangle);
+      const Eigen::Vector3d direction = border ? border_normal(positions, at_corners, nearest.barycentric)
+                                               : normal_of(positions, at_corners);
+      distance = direction.dot(seen - nearest.position);
     }
-    double& distance = rows[static_cast<Eigen::Index>(i)];
-    if (place.term == Term::force) {
-      distance = (*observation.force - force)[place.axis];
-      continue;
-    }
-    const auto point = [&](const data::Points& points) {
-      return Eigen::Vector3d(simulated_from_observed *
-                             points.row(static_cast<Eigen::Index>(place.mark)).transpose());
-    };
-    if (place.term == Term::mark) {
-      const Eigen::Vector3d seen = point(observation.markers);
-      distance = (seen - sheet.mark(observation.marks[place.mark], seen).position)[place.axis];
-      continue;
-    }
-    const bool border = place.term == Term::border;
-    const Eigen::Vector3d seen = point(border ? observation.contour : observation.points);
-    const SurfacePoint nearest = border ? sheet.nearest_on_border(seen) : sheet.nearest(seen, triangles[i]);
-    triangles[i] = nearest.triangle;
-    const Eigen::Vector3i at_corners = corners.row(nearest.triangle);
-    const Eigen::Vector3d direction =
-        border ? border_normal(positions, at_corners, nearest.barycentric) : normal_of(positions, at_corners);
-    distance = direction.dot(seen - nearest.position);
+  };
+  if (threads <= 1) {
+    measure(0, places_.size(), sheet);
+    return rows;
   }
+  const std::vector<Eigen::Index> counts = rows_of_keyframes();
+  std::vector<std::size_t> ends = {0};
+  for (const Eigen::Index count : counts) ends.push_back(ends.back() + static_cast<std::size_t>(count));
+  for_each_part(counts.size(), threads, [&](std::size_t first, std::size_t last) {
+    SheetDistance own = sheet;
+    measure(ends[first], ends[last], own);
+  });
   return rows;
 }
 

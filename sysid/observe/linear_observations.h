@@ -53,8 +53,8 @@ class LinearObservations {
   /// take with all else. `sheet`: of the replay, moved. `triangles`: of each row, where it belonged last, or
   /// empty; then where it does. It changes speed only.
   Eigen::VectorXd distances(const Replay& replay, const Motion& motion, const Registration& registration,
-                            const SheetShifts& shifts, SheetDistance& sheet,
-                            std::vector<int>& triangles) const;
+                            const SheetShifts& shifts, SheetDistance& sheet, std::vector<int>& triangles,
+                            int threads = 1) const;
 
   /// How far another motion takes the sheet from each place, along the direction [m]; `replay` is of `motion`
   /// and may have another mesh. Before any registration anew.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "data/parallel.h"
+
 namespace flash::sysid {
 
 void add(SheetShifts& a, double share, const SheetShifts& b) {
@@ -19,14 +21,14 @@ void add(SheetShifts& a, double share, const SheetShifts& b) {
   }
 }
 
-std::vector<SheetShapes> side_by_side(const std::vector<const SheetShifts*>& shifts) {
+std::vector<SheetShapes> side_by_side(const std::vector<const SheetShifts*>& shifts, int threads) {
   const auto any =
       std::find_if(shifts.begin(), shifts.end(), [](const SheetShifts* each) { return !each->empty(); });
   if (any == shifts.end()) return {};
   const auto columns = static_cast<Eigen::Index>(shifts.size());
   const SheetShifts& first = **any;
   std::vector<SheetShapes> shapes(first.size());
-  for (std::size_t k = 0; k < shapes.size(); ++k) {
+  data::for_each_in_parallel(shapes.size(), threads, [&](std::size_t k) {
     shapes[k].positions.setZero(first[k].positions.size(), columns);
     shapes[k].force.setZero(3, columns);
     for (Eigen::Index c = 0; c < columns; ++c) {
@@ -36,7 +38,7 @@ std::vector<SheetShapes> side_by_side(const std::vector<const SheetShifts*>& shi
           Eigen::Map<const Eigen::VectorXd>(each[k].positions.data(), each[k].positions.size());
       shapes[k].force.col(c) = each[k].force;
     }
-  }
+  });
   return shapes;
 }
 

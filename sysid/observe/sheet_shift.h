@@ -26,7 +26,7 @@ struct SheetShapes {
 };
 
 /// One a keyframe; shifts that are empty are zero columns. Empty where all are.
-std::vector<SheetShapes> side_by_side(const std::vector<const SheetShifts*>& shifts);
+std::vector<SheetShapes> side_by_side(const std::vector<const SheetShifts*>& shifts, int threads = 1);
 
 /// Their sum, each by its size.
 void mix(const std::vector<SheetShapes>& shapes, const Eigen::VectorXd& sizes, SheetShifts& sum);
