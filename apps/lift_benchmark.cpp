@@ -14,6 +14,7 @@
 #include "sim/cpu/block_cholesky.h"
 #include "sim/cuda/layout/inverse_tree.h"
 #include "sim/cuda/layout/step_cost.h"
+#include "sim/cuda/most_vertices.h"
 #include "sim/oracle/projective_system.h"
 #include "sim/step/elastic_energy.h"
 
@@ -99,6 +100,13 @@ double milliseconds_of(const std::function<void()>& work) {
   return 1e3 * seconds_since(start) / count;
 }
 
+/// Cells along a side of the towel.
+int cells_of(const LiftBenchmark& benchmark) {
+  return std::max(1, int(std::lround(std::sqrt(double(benchmark.vertices)))) - 1);
+}
+
+}  // namespace
+
 void check(const LiftBenchmark& benchmark) {
   const auto increasing = [](const char* option, double low, double high) {
     if (!(low <= high))
@@ -108,6 +116,11 @@ void check(const LiftBenchmark& benchmark) {
   };
   increasing("young", benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max);
   increasing("bending", benchmark.bending_rigidity_min, benchmark.bending_rigidity_max);
+  const int vertices = (cells_of(benchmark) + 1) * (cells_of(benchmark) + 1);
+  if (benchmark.device == Device::cuda && vertices > cuda::most_vertices)
+    throw data::InputError("--vertices: found " + data::format_count(static_cast<std::size_t>(vertices)) +
+                           ", expected at most " + data::format_count(cuda::most_vertices) +
+                           " on a CUDA device; use --device cpu");
   const int at_once = std::min(benchmark.threads, benchmark.environments);
   const double needed = solver_bytes_per_vertex * benchmark.vertices * at_once;
   const double limit = data::memory_limit();
@@ -119,14 +132,11 @@ void check(const LiftBenchmark& benchmark) {
                            data::format_count(static_cast<std::size_t>(limit / 1e6)) + " MB that there are");
 }
 
-}  // namespace
-
 LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std::atomic<bool>& stop) {
   check(benchmark);
-  const int cells = std::max(1, int(std::lround(std::sqrt(double(benchmark.vertices)))) - 1);
   data::RectangleMesh rectangle;
   rectangle.width = rectangle.height = side;
-  rectangle.cells_x = rectangle.cells_y = cells;
+  rectangle.cells_x = rectangle.cells_y = cells_of(benchmark);
   const auto plan = make_sheet_plan(make_sheet(data::rectangle(rectangle)), benchmark.level);
   BatchSettings settings;
   settings.solver.time_step = benchmark.time_step;

@@ -56,8 +56,11 @@ struct LiftBenchmarkResult {
   double least_bytes = 0, least_flops = 0;  ///< of a step of one environment on a device, without contact
 };
 
-/// Throws data::InputError where a range ends below its start, or where the solvers at work need more memory
-/// than there is; data::Stopped within a step after `stop` is set.
+/// Throws data::InputError where a range ends below its start, where the solvers at work need more memory
+/// than there is, or where a device is to take more vertices than any can.
+void check(const LiftBenchmark& benchmark);
+
+/// Throws as check() does; data::Stopped within a step after `stop` is set.
 LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std::atomic<bool>& stop);
 
 }  // namespace flash::sim

@@ -126,6 +126,14 @@ int bench(BenchOptions options) {
   benchmark.cuda_devices = choice.cuda_devices;
   benchmark.projective = options.method == "projective";
   const bool on_device = benchmark.device == sim::Device::cuda;
+  std::vector<sim::LiftBenchmark> benchmarks;  // all are checked before the first is run
+  for (const int vertices : options.vertices)
+    for (const int environments : options.environments) {
+      benchmark.vertices = vertices;
+      benchmark.environments = environments;
+      sim::check(benchmark);
+      benchmarks.push_back(benchmark);
+    }
   sim::DeviceRates rates;
   if (on_device)
     rates = sim::device_rates(benchmark.cuda_devices.empty() ? 0 : benchmark.cuda_devices.front());
@@ -140,18 +148,15 @@ int bench(BenchOptions options) {
     json["rates"] = {
         {"name", rates.name}, {"copied_bytes", rates.copied_bytes}, {"single_flops", rates.single_flops}};
   if (on_device && !options.json) print_device_head(rates, benchmark.cuda_devices.size());
-  for (const int vertices : options.vertices)
-    for (const int environments : options.environments) {
-      benchmark.vertices = vertices;
-      benchmark.environments = environments;
-      const Run run = {benchmark, sim::run_lift_benchmark(benchmark, stop_on_signals())};
-      if (options.json)
-        json["runs"].push_back(json_of(run));
-      else if (on_device)
-        print_device(run, rates);
-      else
-        print_cpu(run);
-    }
+  for (const sim::LiftBenchmark& each : benchmarks) {
+    const Run run = {each, sim::run_lift_benchmark(each, stop_on_signals())};
+    if (options.json)
+      json["runs"].push_back(json_of(run));
+    else if (on_device)
+      print_device(run, rates);
+    else
+      print_cpu(run);
+  }
   if (options.json) std::cout << json.dump(2) << '\n';
   return exit_done;
 }

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "tests/data/temporary_folder.h"
+
 namespace flash::sim {
 namespace {
 
@@ -42,6 +44,19 @@ TEST(LiftBenchmark, TakesTheIterationsOfItsBaseline) {
   if (HasFailure())
     ADD_FAILURE() << "If this change is meant to change the counts, renew tests/apps/lift_counts.json with\n"
                   << found.dump(2);
+}
+
+// Before anything is made, and wherever there is no device.
+TEST(LiftBenchmark, MoreVerticesThanADeviceTakesAreRefused) {
+  const auto refusal = [](int vertices, Device device) {
+    return data::input_error_of([&] { check({.vertices = vertices, .device = device}); });
+  };
+  EXPECT_EQ(refusal(1'000'000, Device::cuda),
+            "--vertices: found 1,000,000, expected at most 65,536 on a CUDA device; use --device cpu");
+  EXPECT_EQ(refusal(65'800, Device::cuda),  // the next square number
+            "--vertices: found 66,049, expected at most 65,536 on a CUDA device; use --device cpu");
+  EXPECT_EQ(refusal(65'600, Device::cuda), "");
+  EXPECT_EQ(refusal(65'800, Device::cpu), "");
 }
 
 }  // namespace
