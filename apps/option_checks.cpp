@@ -24,6 +24,27 @@ CLI::Validator number_check(const std::string& description, const std::string& e
       description);
 }
 
+/// The words between commas.
+std::vector<std::string> items_of(const std::vector<std::string>& texts) {
+  std::vector<std::string> items;
+  for (const std::string& text : texts)
+    for (const std::string_view word : data::split(text, ",")) items.emplace_back(word);
+  return items;
+}
+
+/// `check` of each word between commas, none of which is empty.
+CLI::Validator of_each(const CLI::Validator& check) {
+  return CLI::Validator(
+      [check](std::string& text) {
+        for (std::string& item : items_of({text})) {
+          if (item.empty()) return refusal(text, "a value on either side of each comma");
+          if (std::string why = check(item); !why.empty()) return why;
+        }
+        return std::string();
+      },
+      check.get_description());
+}
+
 std::string grouped(long value) {
   return (value < 0 ? "-" : "") + data::format_count(static_cast<std::size_t>(std::abs(value)));
 }
@@ -83,6 +104,44 @@ CLI::Option* add_vector_option(CLI::App& verb, const std::string& name, std::vec
       ->type_name("X,Y,Z");
 }
 
+CLI::Option* add_list_option(CLI::App& verb, const std::string& name, std::vector<std::string>& values,
+                             const std::string& meaning, const CLI::Validator& check, std::size_t count) {
+  return verb
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [name, count, &values](const std::vector<std::string>& texts) {
+            values = items_of(texts);
+            if (count > 0 && values.size() != count)
+              throw data::InputError(name + ": found " + std::to_string(values.size()) + ", expected " +
+                                     std::to_string(count) + " with a comma between them");
+          },
+          meaning)
+      ->check(of_each(check));
+}
+
+CLI::Option* add_list_option(CLI::App& verb, const std::string& name, std::vector<int>& values,
+                             const std::string& meaning, const CLI::Validator& check) {
+  return verb
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [&values](const std::vector<std::string>& texts) {
+            values.clear();
+            for (const std::string& item : items_of(texts))
+              values.push_back(static_cast<int>(data::parse_integer(item).value()));
+          },
+          meaning)
+      ->type_name("INT")
+      ->check(of_each(check));
+}
+
 CLI::Validator thread_number() { return whole_number(0, 1024); }
+
+CLI::Validator cpu_alone(const std::string& why) {
+  return CLI::Validator(
+      [why](std::string& text) {
+        return text == "auto" || text == "cpu" ? "" : refusal(text, "auto or cpu: " + why);
+      },
+      "{auto,cpu}");
+}
 
 }  // namespace flash

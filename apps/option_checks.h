@@ -1,5 +1,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,20 @@ CLI::Validator time_step();
 CLI::Option* add_vector_option(CLI::App& verb, const std::string& name, std::vector<double>& value,
                                const std::string& meaning);
 
+/// Values with commas between them, each of which `check` takes; `count` of them, 0: any number. None is
+/// empty: CLI11's own delimiter would leave such out without a word.
+CLI::Option* add_list_option(CLI::App& verb, const std::string& name, std::vector<std::string>& values,
+                             const std::string& meaning, const CLI::Validator& check = {},
+                             std::size_t count = 0);
+/// The same of whole numbers, to which `check` has to keep.
+CLI::Option* add_list_option(CLI::App& verb, const std::string& name, std::vector<int>& values,
+                             const std::string& meaning, const CLI::Validator& check);
+
 /// Of --threads: 0 means one a processor.
 CLI::Validator thread_number();
+
+/// Of --device where no device does the work: auto or cpu. `why` goes into the refusal, as "scenes run on the
+/// CPU alone".
+CLI::Validator cpu_alone(const std::string& why);
 
 }  // namespace flash

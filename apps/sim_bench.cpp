@@ -177,10 +177,8 @@ void add_bench_verb(CLI::App& app, Action& action) {
     verb.add_option(name, value, text)->check(positive_number())->capture_default_str();
   };
   const auto counts = [&](const char* name, std::vector<int>& values, const char* text, long low) {
-    verb.add_option(name, values, text)
-        ->delimiter(',')
-        ->check(whole_number(low, 1'000'000))
-        ->capture_default_str();
+    add_list_option(verb, name, values, text, whole_number(low, 1'000'000))
+        ->default_str(std::to_string(values.front()));
   };
   counts("--vertices", options->vertices, "Approximate numbers of vertices of the towel", 4);
   counts("--envs", options->environments, "Numbers of materials", 1);

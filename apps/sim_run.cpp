@@ -124,8 +124,6 @@ void say_what_is_left(const sim::SceneSummary& summary, int steps, const std::st
 }
 
 int run(const RunOptions& options) {
-  if (options.device == "cuda")
-    throw data::InputError("--device cuda: scenes run on the CPU alone; use --device cpu or auto");
   namespace fs = std::filesystem;
   data::check_folder_free(options.out, options.force);
   std::optional<data::RunFolder> folder;
@@ -215,7 +213,7 @@ void add_run_verb(CLI::App& app, Action& action) {
   verb.add_option("scene", options->scene, "Scene file (.json)")->required();
   verb.add_option("-o,--out", options->out, "Folder to write")->required();
   verb.add_option("--device", options->device, "Where the simulation runs")
-      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->check(cpu_alone("scenes run on the CPU alone"))
       ->capture_default_str();
   verb.add_option("--threads", options->threads, "Objects that step at the same time; 0: one a processor")
       ->check(thread_number())

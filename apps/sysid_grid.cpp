@@ -179,9 +179,8 @@ void add_grid_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--repeatability", options->repeatability, "Trial-to-trial distance of a keyframe [m]")
       ->check(positive_number());
-  verb->add_option("--map", options->map, "The two parameters of the report's score map")
-      ->delimiter(',')
-      ->expected(2);
+  add_list_option(*verb, "--map", options->map,
+                  "The two parameters of the report's score map, as bending,friction", {}, 2);
   verb->add_flag("--no-solver-check", options->no_solver_check,
                  "Do not solve the estimate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");

@@ -151,8 +151,7 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--placed", tracks.placed,
                    "Where markers are on the part at rest, CSV marker,x,y,z [m]; three or more tell its pose")
       ->needs(markers);
-  verb->add_option("--on-support", tracks.on_support, "Markers that stay where they are, A,B,...")
-      ->delimiter(',')
+  add_list_option(*verb, "--on-support", tracks.on_support, "Markers that stay where they are, A,B,...")
       ->needs(markers);
   for (const int axis : {0, 1, 2})
     verb->add_option(std::string("--clamp-") + "xyz"[axis], options -> clamp[static_cast<std::size_t>(axis)],

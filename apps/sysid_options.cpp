@@ -110,6 +110,12 @@ void add_device_option(CLI::App& verb, CommonOptions& options) {
       ->capture_default_str();
 }
 
+void add_cpu_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--device", options.device, "Where the simulation runs")
+      ->check(cpu_alone("this verb simulates on the CPU alone"))
+      ->capture_default_str();
+}
+
 void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   CLI::App& group = *verb.add_option_group("Replay and score");
   group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
@@ -167,9 +173,9 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   group.add_flag(
       "--two-sided", options.two_sided,
       "Simulated cloth inside the crop where none was seen counts too: for recordings that see all of it");
-  group.add_option("--share", options.shared, "Errors of registration that all recordings have in common")
-      ->check(CLI::IsMember({"offset", "yaw", "time-offset"}))
-      ->delimiter(',');
+  add_list_option(group, "--share", options.shared,
+                  "Errors of registration that all recordings have in common",
+                  CLI::IsMember({"offset", "yaw", "time-offset"}));
 }
 
 sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions& options, int threads) {
@@ -314,12 +320,6 @@ void place_candidates(const CommonOptions& options, const std::vector<sysid::Rep
     replay.settings.device = sim::Device::cpu;
     replay.settings.cuda_devices.clear();
   }
-}
-
-void require_cpu(const CommonOptions& options) {
-  if (options.device.starts_with("cuda"))
-    throw data::InputError("--device " + options.device +
-                           ": this verb simulates on the CPU alone; use --device cpu or auto");
 }
 
 std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,

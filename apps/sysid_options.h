@@ -28,6 +28,7 @@ inline constexpr const char* force_covers_calibrations =
 void add_common_options(CLI::App& verb, CommonOptions& options, const char* force = force_overwrites);
 void add_seed_option(CLI::App& verb, CommonOptions& options);    ///< of verbs that draw at random
 void add_device_option(CLI::App& verb, CommonOptions& options);  ///< of verbs that simulate
+void add_cpu_option(CLI::App& verb, CommonOptions& options);     ///< of those that no device simulates for
 
 /// How a recording is replayed and scored.
 struct ReplayOptions {
@@ -88,8 +89,6 @@ void place_simulation(const CommonOptions& options, const data::Asset& asset,
 /// Throws data::InputError where --device wants that device.
 void place_candidates(const CommonOptions& options, const std::vector<sysid::ReplayCandidate>& candidates,
                       std::vector<sysid::Replay>& replays);
-/// For verbs that no device simulates for yet. Throws data::InputError for cuda.
-void require_cpu(const CommonOptions& options);
 
 /// The recordings in the folders, told apart by name (a warning says where one was renamed). Throws
 /// data::InputError where two of them are the same.

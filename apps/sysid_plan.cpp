@@ -94,7 +94,6 @@ nlohmann::ordered_json plan_json(const std::vector<sysid::PlannedExperiment>& ex
 
 int run_plan(const CLI::App& verb, const PlanOptions& options) {
   stop_on_signals();
-  require_cpu(options.common);
   const int threads = thread_count(options.common);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   for (const data::Recording& recording : recordings)
@@ -193,7 +192,7 @@ void add_plan_verb(CLI::App& app, Action& action) {
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);
   add_seed_option(*verb, options->common);
-  add_device_option(*verb, options->common);
+  add_cpu_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer("Example:\n  flash-sysid plan lift --asset towel.json -o plan.json");
   verb->callback(

@@ -6,6 +6,7 @@
 #include <regex>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
@@ -208,9 +209,9 @@ void add_replay_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recording, "Folder with recording.json")->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   add_hold_option(*verb, options->holds, "A value in place of the asset's, as bending=1e-4");
-  verb->add_option("--frames", options->frames,
-                   "Keyframes to draw, counted from 0, each and together in sequence.png; without it six")
-      ->delimiter(',');
+  add_list_option(*verb, "--frames", options->frames,
+                  "Keyframes to draw, counted from 0, each and together in sequence.png; without it six",
+                  whole_number(0, 1'000'000));
   verb->add_flag("--every-step", options->every_step, "Write the mesh of every step too");
   verb->add_option("-o,--out", options->out, "Folder for meshes, clouds, overlay.csv and pictures")
       ->required();

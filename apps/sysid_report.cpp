@@ -62,9 +62,8 @@ void add_report_verb(CLI::App& app, Action& action) {
   CLI::App* verb =
       app.add_subcommand("report", "Write the report of a search again: one HTML file that opens anywhere");
   verb->add_option("run", options->run, "Folder of the search")->required();
-  verb->add_option("--map", options->map, "The two parameters of the score map, as bending,friction")
-      ->delimiter(',')
-      ->expected(2);
+  add_list_option(*verb, "--map", options->map, "The two parameters of the score map, as bending,friction",
+                  {}, 2);
   verb->add_option("--points", options->points, "Observed points shown a keyframe at most")
       ->check(whole_number(1, 10000000))
       ->capture_default_str();

@@ -148,7 +148,6 @@ int run_twin(const SynthOptions& options) {
 
 int run_synth(SynthOptions options) {
   stop_on_signals();
-  require_cpu(options.common);
   if (!options.like.empty()) return run_twin(options);
   const data::Asset asset = data::load_asset(options.asset);
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
@@ -282,7 +281,7 @@ void add_synth_verb(CLI::App& app, Action& action) {
                    "File for the truth; without it, truth.json in the recording");
   verb->add_option("-o,--out", options->out, "Folder of the recording")->required();
   add_seed_option(*verb, options->common);
-  add_device_option(*verb, options->common);
+  add_cpu_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
       "Example:\n"

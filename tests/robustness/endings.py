@@ -104,7 +104,19 @@ def refusals(sim, sysid, calib):
         ([*synth, "--displacement", "0 0 0.1"], ["--displacement", "x,y,z"]),
         ([*grid, "--bending", "1e-4,1e-4"], ["--bending", "twice"]),
         ([*bench, "--vertices", "1e9"], ["--vertices", "from 4 to 1,000,000"]),
-        ([*bench, "--vertices", "1000000", "--threads", "1000", "--envs", "1000"], ["--vertices", "MB of memory"]),
+        *[([*bench, "--vertices", sizes, "--threads", "1000", "--envs", "1000"], ["--vertices", "MB of memory"])
+          for sizes in ("1000000", "4,1000000")],
+        *[([*words, option, text], [option, f'found "{text}"', "on either side of each comma"]) for words, option, texts in (
+            (bench, "--vertices", ("1000,", ",1000", "1000,,2000", ",")), (bench, "--envs", ("4,", ",,4")),
+            (grid, "--map", ("bending,,friction",)), ([sysid, "report", "run"], "--map", ("bending,",)),
+            (grid, "--share", ("offset,",)), ([sysid, "replay", "recording", "-o", "out"], "--frames", ("1,", ",2")),
+            ([sysid, "import", "--markers", "tracks.csv"], "--on-support", ("A,",))) for text in texts],
+        ([*bench, "--vertices", "1000,x"], ["--vertices", 'found "x"', "from 4 to 1,000,000"]),
+        ([*grid, "--map", "bending"], ["--map: found 1, expected 2"]),
+        ([*grid, "--share", "offset,roll"], ["--share: roll not in {offset,yaw,time-offset}"]),
+        ([*grid, "--bending", "1e-4,,2e-4"], ["--bending", '"" is not a number']),
+        ([sysid, "import", "raw", "--trajectory", "none", "--mesh", "sheet:0.2x0.2:0.05", "--grasp", "vertices:1,", "-o", "out"],
+         ["--grasp", "vertices:1,", "whole numbers"]),
         ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "above 0"]),
         ([*bench, "--young-min", "5", "--young-max", "3"], ["--young-max", "found 3", "at least the 5"]),
         ([*synth, "--hold", "foo=1"], ["--hold foo", "unknown parameter"]),
@@ -156,6 +168,7 @@ def check_refusals(options, folder):
         yield done.returncode == REFUSED, f"{where}: exit code {done.returncode}: {text[-500:]}"
         yield text and "\n" not in text and len(text) < 900, f"{where}: not one readable line: {text[:900]}"
         yield all(word in text for word in expected), f"{where}: does not say {expected}: {text[:500]}"
+        yield not done.stdout, f"{where}: prints {done.stdout[:200]}"
         yield not any(word.startswith("--") and "_" in word for word in text.split()), f"{where}: no such option: {text}"
         yield left_in(folder) == before, f"{where}: left {set(left_in(folder)) - set(before)}"
 

@@ -149,9 +149,12 @@ def check_values(options, folder):
 def check_device(options, folder):
     """--device cuda of verbs that no device does, and without one of those that it does."""
     yield from refused(options, folder, [options.sim, "run", "short.json", "-o", "out", "--device", "cuda"],
-                       "--device cuda", "on the CPU alone")
-    synth = [options.sysid, "synth", "--asset", "cloth.json", "--kind", "hang", "-o", "out", "--device", "cuda"]
-    yield from refused(options, folder, synth, "--device cuda", "on the CPU alone")
+                       '--device: found "cuda"', "auto or cpu", "on the CPU alone")
+    for words in ([options.sysid, "synth", "--asset", "cloth.json", "--kind", "hang"],
+                  [options.sysid, "plan", "recording", "--asset", "asset.json"]):
+        for device in ("cuda", "cuda:0", "gpu"):
+            yield from refused(options, folder, [*words, "-o", "out", "--device", device], f'--device: found "{device}"',
+                               "auto or cpu", "on the CPU alone")
     # Without a device, whatever the machine has.
     hidden = dict(os.environ, CUDA_VISIBLE_DEVICES="")
     yield from refused(options, folder, [options.sim, "bench", "--device", "cuda"], "--device cuda", "CUDA",
@@ -198,6 +201,9 @@ def check_help(options, folder):
         text = program.must(*words, "--help").stdout
         for option, value in values.items():
             yield re.search(f"{option} {value}(,| |$)", text, re.MULTILINE), f"{words[1]} --help: not {option} {value}"
+    for words in ([options.sim, "run"], [options.sysid, "synth"], [options.sysid, "plan"]):
+        text = program.must(*words, "--help").stdout
+        yield "--device DEVICE:{auto,cpu}=auto" in text and "cuda" not in text, f"{words[1]} --help: {text}"
 
 
 def check_places(options, folder):
