@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -85,6 +86,12 @@ class TemporaryFile {
   std::string path_, name_;
 };
 
+/// Whether a file has the name of a TemporaryFile: path.PID-SERIAL.tmp.
+bool is_temporary(const std::filesystem::path& path) {
+  static const std::regex name(R"(.+\.\d+-\d+\.tmp)");
+  return std::regex_match(path.filename().string(), name);
+}
+
 }  // namespace
 
 void write_atomically(const std::string& path, std::string_view contents, Sync sync) {
@@ -99,11 +106,23 @@ void write_together(const std::vector<FileText>& files) {
 }
 
 void remove_leftovers(const std::string& folder) {
-  static const std::regex name(R"(.+\.\d+-\d+\.tmp)");  // path.PID-SERIAL.tmp, see above
   std::vector<std::filesystem::path> left;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-    if (std::regex_match(entry.path().filename().string(), name)) left.push_back(entry.path());
+    if (is_temporary(entry.path())) left.push_back(entry.path());
   for (const std::filesystem::path& path : left) std::filesystem::remove(path);
+}
+
+void remove_old_leftovers(const std::string& folder, const std::string& extension) {
+  const auto day_ago = std::filesystem::file_time_type::clock::now() - std::chrono::hours(24);
+  std::vector<std::filesystem::path> left;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (is_temporary(entry.path()) && entry.path().stem().stem().extension() == extension)
+      left.push_back(entry.path());
+  for (const std::filesystem::path& path : left) {
+    std::error_code gone;  // another program may have been quicker
+    const auto written = std::filesystem::last_write_time(path, gone);
+    if (!gone && written < day_ago) std::filesystem::remove(path, gone);
+  }
 }
 
 std::string read_file(const std::string& path) {

@@ -25,6 +25,10 @@ void write_together(const std::vector<FileText>& files);
 /// Removes from `folder` the temporary files of writers that were killed. Only while nobody writes there.
 void remove_leftovers(const std::string& folder);
 
+/// Where others may write to `folder` too, and it may hold other things: removes those temporary files of
+/// files with this extension, as ".rollout", that nothing was written to for a day. No writer takes as long.
+void remove_old_leftovers(const std::string& folder, const std::string& extension);
+
 /// The whole file as bytes. Throws InputError naming the path: a device or a pipe, which may never end, is no
 /// input, and neither is a file above 1 GB.
 std::string read_file(const std::string& path);

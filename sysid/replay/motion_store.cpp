@@ -21,6 +21,7 @@ namespace flash::sysid {
 namespace {
 
 constexpr std::string_view kMagic = "flash-rollout/4\n";
+constexpr const char* kExtension = ".rollout";
 constexpr std::size_t kDigest = 64;  // hexadecimal digits of a SHA-256
 
 /// Numbers as the bytes they are.
@@ -202,10 +203,11 @@ std::optional<ReplayResult> load(const Replay& replay, const std::vector<int>& k
 
 MotionStore::MotionStore(const std::string& folder) : folder_(folder) {
   std::filesystem::create_directories(folder);
+  data::remove_old_leftovers(folder, kExtension);
 }
 
 std::string MotionStore::path_of(const std::string& key) const {
-  return (std::filesystem::path(folder_) / (key + ".rollout")).string();
+  return (std::filesystem::path(folder_) / (key + kExtension)).string();
 }
 
 void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& candidates,

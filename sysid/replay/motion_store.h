@@ -20,7 +20,8 @@ struct WantedMotion {
 /// simulated again.
 class MotionStore {
  public:
-  /// Creates the folder. Throws std::runtime_error where it cannot.
+  /// Creates the folder; removes what programs that were killed a day ago or earlier left in it. Throws
+  /// std::runtime_error where it cannot.
   explicit MotionStore(const std::string& folder);
 
   /// The candidates' motions at the scored steps, from the folder where they are there, else simulated and

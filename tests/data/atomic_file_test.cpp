@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -53,6 +54,26 @@ TEST(WriteTogether, WritesAllOrNone) {
     if (entry.is_regular_file()) left.push_back(entry.path().filename().string());
   std::sort(left.begin(), left.end());
   EXPECT_EQ(left, (std::vector<std::string>{"first", "second"}));
+}
+
+// A program that was killed leaves them; one that still writes has written within the day.
+TEST(RemoveOldLeftovers, TakesTemporaryFilesOfADayAgoAndNothingElse) {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder;
+  const auto write = [&](const std::string& name, std::chrono::hours ago) {
+    fs::last_write_time(folder.write(name, "1"), fs::file_time_type::clock::now() - ago);
+  };
+  const std::chrono::hours old(25), recent(23);
+  write("a.rollout.12-0.tmp", old);
+  write("b.rollout.12-3.tmp", recent);
+  for (const char* other :
+       {"a.rollout", "a.json.12-0.tmp", "a.rollout.tmp", "a.rollout.12-0.tmp2", "deeper/a.rollout.12-0.tmp"})
+    write(other, old);
+  remove_old_leftovers(folder / ".", ".rollout");
+  EXPECT_FALSE(fs::exists(folder / "a.rollout.12-0.tmp"));
+  for (const char* kept : {"b.rollout.12-3.tmp", "a.rollout", "a.json.12-0.tmp", "a.rollout.tmp",
+                           "a.rollout.12-0.tmp2", "deeper/a.rollout.12-0.tmp"})
+    EXPECT_TRUE(fs::exists(folder / kept)) << kept;
 }
 
 TEST(WriteAtomically, ReplacesNoPipeAndNoDevice) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 
 #include "data/atomic_file.h"
@@ -117,6 +118,17 @@ TEST(Replay, ACandidateThatNoDeviceSimulatesIsNamedAmongOthers) {
   EXPECT_EQ(why_not_on_device(replay, {plain, plain}), "");
   EXPECT_NE(why_not_on_device(replay, {plain, yields}).find("yield_curvature"), std::string::npos);
   EXPECT_NE(why_not_on_device(replay, {plain, woven}).find("young_ratio"), std::string::npos);
+}
+
+TEST(MotionStore, RemovesWhatWasLeftByAProgramThatWasKilledADayAgo) {
+  namespace fs = std::filesystem;
+  const data::TemporaryFolder folder;
+  const std::string left = folder.write("rollouts/KEY.rollout.12-0.tmp", "half a motion");
+  const MotionStore beside_a_writer(folder / "rollouts");
+  EXPECT_TRUE(fs::exists(left));
+  fs::last_write_time(left, fs::file_time_type::clock::now() - std::chrono::hours(25));
+  const MotionStore store(folder / "rollouts");
+  EXPECT_FALSE(fs::exists(left));
 }
 
 TEST(MotionStore, AFileThatIsNotAsItWasWrittenIsSimulatedAgainAndAnotherIsNamed) {
