@@ -141,9 +141,10 @@ void read_properties(const JsonObject& props, Asset& asset) {
   for (const char* key : {"thickness", "bending", "bending_rigidity", "bending_model"})
     if (solid && !published && props.has(key))
       throw props.error(key, "no such field for element_type TETRAHEDRON");
-  if (props.has("thickness")) asset.thickness = props.positive("thickness");
-  if (props.has("bending")) asset.published_bending = props.not_negative("bending");
-  if (props.has("bending_rigidity")) asset.bending_rigidity = props.not_negative("bending_rigidity");
+  if (props.has("thickness")) asset.thickness = at_most("thickness", props.positive("thickness"), 1);
+  if (props.has("bending")) asset.published_bending = at_most("bending", props.not_negative("bending"), 1e6);
+  if (props.has("bending_rigidity"))
+    asset.bending_rigidity = at_most("bending_rigidity", props.not_negative("bending_rigidity"), 1e6);
   if (props.has("bending_model"))
     asset.bending_model =
         parse_bending_model(props.string("bending_model"), asset.source, props.name_of("bending_model"));
@@ -157,8 +158,8 @@ void read_properties(const JsonObject& props, Asset& asset) {
   if (!published && !solid && !asset.thickness && !asset.bending_rigidity)
     throw props.error("bending_rigidity", "D [N m], or a thickness for the plate formula");
   asset.friction = at_most("friction", props.not_negative("friction", asset.friction), 1e3);
-  asset.air_drag = props.not_negative("air_drag", 0);
-  asset.stiffness_damping = props.not_negative("stiffness_damping", 0);
+  asset.air_drag = at_most("air_drag", props.not_negative("air_drag", 0), 1e4);
+  asset.stiffness_damping = at_most("stiffness_damping", props.not_negative("stiffness_damping", 0), 1e3);
 }
 
 ElementOrder read_element_order(const JsonObject& file, ElementType type) {
@@ -175,6 +176,16 @@ double areal_density_of(const Asset& asset, double rest_area) {
   if (asset.areal_density) return *asset.areal_density;
   if (asset.density) return *asset.density * asset.thickness.value_or(1);
   return (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_area;
+}
+
+/// A mass per area or volume, however the asset states it. Far from those of things, weight and forces are
+/// beyond the digits of each other, or beyond all numbers.
+double checked_density(const Asset& asset, double density, double low, double high,
+                       const std::string& expected) {
+  if (density >= low && density <= high) return density;
+  throw input_error(asset.source, "mechanical_props",
+                    "found a mass of " + format_short(density) + ", expected " + format_short(low) + " to " +
+                        format_short(high) + ' ' + expected);
 }
 
 /// A woven sheet's numbers across its warp and between.
@@ -293,7 +304,8 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
   m.constitutive = asset.constitutive;
   m.poissons_ratio = asset.poisson;
   m.membrane_stiffness = asset.young * asset.thickness.value_or(1);
-  m.areal_density = areal_density_of(asset, rest_area);
+  m.areal_density =
+      checked_density(asset, areal_density_of(asset, rest_area), 1e-9, 1e4, "kg/m^2, as sheets have");
   m.friction = asset.friction;
   m.air_drag = asset.air_drag;
   m.stiffness_damping = asset.stiffness_damping;
@@ -346,8 +358,10 @@ ResolvedSolid resolve_solid(const Asset& asset, double rest_volume) {
   m.constitutive = asset.constitutive;
   m.youngs_modulus = asset.young;
   m.poissons_ratio = asset.poisson;
-  m.density = asset.density ? *asset.density
-                            : (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_volume;
+  const double density = asset.density
+                             ? *asset.density
+                             : (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_volume;
+  m.density = checked_density(asset, density, 1e-6, 1e6, "kg/m^3, as solids have");
   m.friction = asset.friction;
   m.air_drag = asset.air_drag;
   m.stiffness_damping = asset.stiffness_damping;

@@ -254,6 +254,13 @@ TEST(Asset, WhatNoMaterialHasIsRefused) {
   EXPECT_NE(error({{"young", 1e300}}).find("young: found 1e+300, expected at most 1e+13"), std::string::npos);
   EXPECT_NE(error({{"friction", 1e9}}).find("friction: found 1000000000.0, expected at most 1000"),
             std::string::npos);
+  for (const auto& [key, most] : {std::pair{"thickness", "1"},
+                                  {"bending_rigidity", "1e+06"},
+                                  {"air_drag", "1e+04"},
+                                  {"stiffness_damping", "1000"}})
+    EXPECT_TRUE(
+        error({{key, 1e300}}).ends_with(key + std::string(": found 1e+300, expected at most ") + most))
+        << key;
   EXPECT_NE(error({{"constitutive", "TRI_STVK"}, {"young_ratio", 1e-9}}).find("a number from 0.01 to 100"),
             std::string::npos);
   const auto solid_error = [&](const char* key) {
@@ -267,6 +274,36 @@ TEST(Asset, WhatNoMaterialHasIsRefused) {
   };
   for (const char* key : {"thickness", "bending_rigidity", "bending_model"})
     EXPECT_NE(solid_error(key).find("no such field for element_type TETRAHEDRON"), std::string::npos) << key;
+}
+
+// However it is stated: each extreme alone is a positive number.
+TEST(Asset, AMassThatNothingHasIsRefused) {
+  Asset sheet, solid;
+  sheet.source = "towel.json";
+  solid.source = "cube.json";
+  solid.element_type = ElementType::tetrahedron;
+  const auto of_sheet = [&] { return input_error_of([&] { resolve_sheet(sheet, 0.5); }); };
+  sheet.areal_density = 1e-300;
+  EXPECT_EQ(
+      of_sheet(),
+      "towel.json: mechanical_props: found a mass of 1e-300, expected 1e-09 to 1e+04 kg/m^2, as sheets have");
+  sheet.areal_density.reset();
+  sheet.density = 1e300;
+  sheet.thickness = 1e300;
+  EXPECT_NE(of_sheet().find("found a mass of inf"), std::string::npos) << of_sheet();
+  sheet.density.reset();
+  sheet.thickness.reset();
+  sheet.mass = 1e5;
+  EXPECT_NE(of_sheet().find("found a mass of 2e+05"), std::string::npos) << of_sheet();
+  sheet.mass = 0.1;
+  EXPECT_EQ(of_sheet(), "");
+  const auto of_solid = [&] { return input_error_of([&] { resolve_solid(solid, 0.5); }); };
+  solid.mass = 1e-9;
+  EXPECT_EQ(
+      of_solid(),
+      "cube.json: mechanical_props: found a mass of 2e-09, expected 1e-06 to 1e+06 kg/m^3, as solids have");
+  solid.mass = 500;
+  EXPECT_EQ(of_solid(), "");
 }
 
 TEST(Asset, MembranesMayBeWoven) {
