@@ -114,6 +114,18 @@ std::string warning_of_misfit(const SummaryRecording& recording, const std::stri
          ". The intervals allow for it, but are those of a model that does not fit";
 }
 
+/// ": numbers 3, 7 of results.csv"; of many, the first five.
+std::string numbers_of_unconverged(const std::vector<CandidateResult>& candidates) {
+  constexpr int kNamed = 5;
+  std::string numbers;
+  int count = 0;
+  for (const CandidateResult& candidate : candidates)
+    if (candidate.status != CandidateStatus::ok && ++count <= kNamed)
+      numbers += (numbers.empty() ? " " : ", ") + std::to_string(candidate.id);
+  return std::string(count > 1 ? ": numbers" : ": number") + numbers + (count > kNamed ? ", ..." : "") +
+         " of results.csv";
+}
+
 /// What the search's mesh and that of half the cell hold of a sheet differs where a cell does not divide the
 /// grasped patch: then cells of no size hold what neither does.
 std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) {
@@ -182,7 +194,8 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
                        " mm below the table: is the table's height right?");
   if (summary.unconverged > 0)
     warnings.push_back(data::format_count(static_cast<std::size_t>(summary.unconverged)) + " of " +
-                       data::format_count(found) + " candidates did not converge in every step");
+                       data::format_count(found) + " candidates did not converge in every step" +
+                       numbers_of_unconverged(candidates));
   if (settings.base.material.constitutive == data::Constitutive::tri_arap &&
       axis_named(settings.axes, "young"))
     warnings.push_back("under TRI_ARAP young is known through young / (1 + poisson) only");
