@@ -11,6 +11,7 @@
 #include <optional>
 #include <set>
 #include <string_view>
+#include <system_error>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
@@ -121,7 +122,7 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
   if (!holds_search && existing != Existing::replace) check_holds_nothing(folder, axes);
   fs::create_directories(folder);
   lock_ = ::open(path_of(folder, ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (lock_ < 0) throw std::runtime_error(folder + ": cannot be written: " + std::strerror(errno));
+  if (lock_ < 0) throw std::system_error(errno, std::generic_category(), folder);
   try {
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
       throw data::InputError(folder + ": another run is writing to it; wait for it, or name another folder");

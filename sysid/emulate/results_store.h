@@ -28,7 +28,8 @@ class ResultsStore {
   /// Creates `folder`, or treats what it holds as `existing` says. Throws data::InputError, with nothing
   /// changed, where another process writes to it; where it holds results that are to be refused; where it is
   /// to go on with results of another fingerprint (naming what differs) or of recordings in another order;
-  /// and, unless they are to be replaced, where it holds results without grid.json.
+  /// and, unless they are to be replaced, where it holds results without grid.json. Throws std::system_error
+  /// where no file can be made in it.
   ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
                const std::vector<std::string>& recordings, const Fingerprint& fingerprint, Existing existing);
   ~ResultsStore();

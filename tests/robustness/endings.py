@@ -281,6 +281,15 @@ def check_resume(options, folder):
     done = program.call(*grid, "--time-step", "0.005")
     yield (done.returncode == REFUSED and "results: time_step_s was 0.01 and is 0.005" in done.stderr,
            f"--resume --time-step: exit code {done.returncode}: {done.stderr}")
+    # No permission keeps an administrator out; a folder in the place of the lock does, as a read-only disk would.
+    (folder / "begun" / ".lock").unlink()
+    (folder / "begun" / ".lock").mkdir()
+    for words in (grid, [*(word for word in grid if word != "--resume"), "--force"]):
+        before = left_in(folder / "begun")
+        done = program.call(*words)
+        yield (done.returncode == REFUSED and done.stderr == f"flash-sysid: {folder / 'begun'}: Is a directory\n",
+               f"a search that cannot be locked: exit code {done.returncode}: {done.stderr}")
+        yield left_in(folder / "begun") == before, "a search that cannot be locked loses something"
 
 
 def check_order(options, folder):
