@@ -55,8 +55,7 @@ __device__ const ProjectiveWork<keeping>& begin_environment(CommonState<keeping>
         {numbers.solve, numbers.solve_at, memory.solve, tiles, numbers.tiles_at, numbers.near_tiles},
         {numbers.places_at, memory.places, size},
         numbers.vertices + factor * size,
-        shared_memory<double>(),
-        e};
+        shared_memory<double>()};
   });
 }
 

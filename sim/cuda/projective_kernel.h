@@ -5,8 +5,8 @@
 
 namespace flash::sim::cuda {
 
-/// Decides what stands on chip in a team of so many blocks: vectors of solves and tiles of the factor in that
-/// of one block; several share them in memory.
+/// Decides what stands on chip in a team of so many blocks: places and vectors of solves where there is room
+/// for all of them, and with one block as many tiles of the factor as find room.
 void place_on_chip(ProjectiveNumbers& numbers, InversePrecision precision, int blocks);
 
 /// Teams of so many blocks that the device works with at the same time.

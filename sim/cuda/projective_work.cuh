@@ -14,7 +14,6 @@ struct ProjectiveWork {
   VertexPlaces<keeping> places;
   const SolveVertex* vertices;  ///< of the factor
   double* partial;              ///< on chip
-  int environment;
 
   __device__ const SheetTables& tables() const { return numbers.replay.sheet; }
 };
@@ -28,7 +27,7 @@ __device__ void count_phase(const Work& w, ProjectivePhase phase) {
 /// How far the last solve moves a vertex [m]. `back`: SolveScale of its right-hand side.
 template <Keeping keeping>
 struct SolvedWay {
-  const InverseWork<keeping> inverse;
+  InverseWork<keeping> inverse;
   const SolveVertex* vertices;
   float back;
 
@@ -37,7 +36,6 @@ struct SolvedWay {
   __device__ Vector3<float> operator()(const SolveVertex& vertex) const {
     return (back * vertex.scale) * vector_of(inverse.solution(vertex.slot));
   }
-  __device__ Vector3<float> operator()(int i) const { return (*this)(vertices[i]); }
 };
 
 }  // namespace flash::sim::cuda
