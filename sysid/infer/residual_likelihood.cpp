@@ -121,7 +121,8 @@ Eigen::VectorXd ResidualLikelihood::known_spread() const {
 }
 
 Eigen::VectorXd ResidualLikelihood::curvature_of(const Eigen::VectorXd& left) const {
-  std::vector<double> sizes(left.cwiseAbs().begin(), left.cwiseAbs().end());
+  const Eigen::VectorXd distances = left.cwiseAbs();
+  std::vector<double> sizes(distances.begin(), distances.end());
   const double window = std::max(limit_, data::median(std::move(sizes)));
   return left.unaryExpr([&](double y) { return std::abs(y) <= window ? limit_ / window : 0.0; });
 }
