@@ -77,7 +77,8 @@ void check_options(const GridOptions& options) {
   try {
     data::check_folder_writable(options.rollouts);
   } catch (const data::InputError& error) {
-    throw data::InputError(std::string("--rollouts: ") + error.what() + ", expected a folder");
+    throw data::InputError(std::string("--rollouts: ") + error.what() +
+                           ", expected a folder that takes files");
   }
 }
 

@@ -141,8 +141,10 @@ void read_properties(const JsonObject& props, Asset& asset) {
   for (const char* key : {"thickness", "bending", "bending_rigidity", "bending_model"})
     if (solid && !published && props.has(key))
       throw props.error(key, "no such field for element_type TETRAHEDRON");
-  if (props.has("thickness")) asset.thickness = at_most("thickness", props.positive("thickness"), 1);
-  if (props.has("bending")) asset.published_bending = at_most("bending", props.not_negative("bending"), 1e6);
+  // A published solid may have it, and does not use it.
+  if (props.has("thickness"))
+    asset.thickness = at_most("thickness", props.positive("thickness"), solid ? HUGE_VAL : 1);
+  if (props.has("bending")) asset.published_bending = props.not_negative("bending");
   if (props.has("bending_rigidity"))
     asset.bending_rigidity = at_most("bending_rigidity", props.not_negative("bending_rigidity"), 1e6);
   if (props.has("bending_model"))
@@ -178,14 +180,15 @@ double areal_density_of(const Asset& asset, double rest_area) {
   return (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_area;
 }
 
-/// A mass per area or volume, however the asset states it. Far from those of things, weight and forces are
-/// beyond the digits of each other, or beyond all numbers.
-double checked_density(const Asset& asset, double density, double low, double high,
-                       const std::string& expected) {
-  if (density >= low && density <= high) return density;
+/// A number that follows from several fields, however the asset states it. Far from those of things, weight
+/// and forces are beyond the digits of each other, or beyond all numbers.
+double checked(const Asset& asset, const std::string& name, double value, double low, double high,
+               const std::string& unit) {
+  constexpr double rounding = 1e-12;
+  if (value >= low * (1 - rounding) && value <= high * (1 + rounding)) return value;
   throw input_error(asset.source, "mechanical_props",
-                    "found a mass of " + format_short(density) + ", expected " + format_short(low) + " to " +
-                        format_short(high) + ' ' + expected);
+                    "found a " + name + " of " + format_number(value) + ", expected " + format_short(low) +
+                        " to " + format_short(high) + ' ' + unit);
 }
 
 /// A woven sheet's numbers across its warp and between.
@@ -305,7 +308,7 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
   m.poissons_ratio = asset.poisson;
   m.membrane_stiffness = asset.young * asset.thickness.value_or(1);
   m.areal_density =
-      checked_density(asset, areal_density_of(asset, rest_area), 1e-9, 1e4, "kg/m^2, as sheets have");
+      checked(asset, "mass", areal_density_of(asset, rest_area), 1e-9, 1e4, "kg/m^2, as sheets have");
   m.friction = asset.friction;
   m.air_drag = asset.air_drag;
   m.stiffness_damping = asset.stiffness_damping;
@@ -329,6 +332,7 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
     m.bending_rigidity = 0;
     origin_of_bending = "no bending in the file";
   }
+  checked(asset, "bending rigidity", m.bending_rigidity, 0, 1e6, "N m");
   if (asset.bending_model) m.bending_model = *asset.bending_model;
 
   const std::string source = asset.source.empty() ? "asset" : asset.source;
@@ -361,7 +365,7 @@ ResolvedSolid resolve_solid(const Asset& asset, double rest_volume) {
   const double density = asset.density
                              ? *asset.density
                              : (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_volume;
-  m.density = checked_density(asset, density, 1e-6, 1e6, "kg/m^3, as solids have");
+  m.density = checked(asset, "mass", density, 1e-6, 1e6, "kg/m^3, as solids have");
   m.friction = asset.friction;
   m.air_drag = asset.air_drag;
   m.stiffness_damping = asset.stiffness_damping;

@@ -116,7 +116,8 @@ void remove_old_leftovers(const std::string& folder, const std::string& extensio
   const auto day_ago = std::filesystem::file_time_type::clock::now() - std::chrono::hours(24);
   std::vector<std::filesystem::path> left;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (is_temporary(entry.path()) && entry.path().stem().stem().extension() == extension)
+    if (is_temporary(entry.path()) && entry.path().stem().stem().extension() == extension &&
+        std::filesystem::is_regular_file(entry.symlink_status()))
       left.push_back(entry.path());
   for (const std::filesystem::path& path : left) {
     std::error_code gone;  // another program may have been quicker

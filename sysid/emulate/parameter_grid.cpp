@@ -58,7 +58,7 @@ const std::vector<ParameterInfo>& known_parameters() {
       {"young_ratio", "", true, 0.01, 100, "woven: E across the warp over E along it"},
       {"shear_ratio", "", true, 1e-3, 100, "woven: G over that of an isotropic sheet"},
       {"yield_curvature", "1/m", true, 1e-3, 1e6, "curvature at which bending begins to yield"},
-      {"friction", "", true, 0, 10, "Coulomb coefficient against the table"},
+      {"friction", "", true, 0, 1e3, "Coulomb coefficient against the table"},
       {"areal_density", "kg/m^2", true, 1e-9, 1e4, "mass per area"},
       {"density", "kg/m^3", true, 1e-6, 1e6, "solid: mass per volume"},
       {"air_drag", "1/s", true, 0, 1e4, "mass-proportional damping"},

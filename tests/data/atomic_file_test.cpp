@@ -69,7 +69,11 @@ TEST(RemoveOldLeftovers, TakesTemporaryFilesOfADayAgoAndNothingElse) {
   for (const char* other :
        {"a.rollout", "a.json.12-0.tmp", "a.rollout.tmp", "a.rollout.12-0.tmp2", "deeper/a.rollout.12-0.tmp"})
     write(other, old);
+  const std::string made = folder / "c.rollout.12-0.tmp";  // a folder by somebody else
+  fs::create_directory(made);
+  fs::last_write_time(made, fs::file_time_type::clock::now() - old);
   remove_old_leftovers(folder / ".", ".rollout");
+  EXPECT_TRUE(fs::exists(made));
   EXPECT_FALSE(fs::exists(folder / "a.rollout.12-0.tmp"));
   for (const char* kept : {"b.rollout.12-3.tmp", "a.rollout", "a.json.12-0.tmp", "a.rollout.tmp",
                            "a.rollout.12-0.tmp2", "deeper/a.rollout.12-0.tmp"})

@@ -95,7 +95,7 @@ TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
   EXPECT_NE(message_of([] { parse_hold("colour=1"); }).find("expected one of young, poisson"),
             std::string::npos);
   EXPECT_EQ(message_of([] { parse_hold("friction=1e300"); }),
-            "--hold friction: found 1e+300, expected 0 to 10");
+            "--hold friction: found 1e+300, expected 0 to 1000");
   EXPECT_EQ(message_of([] { parse_hold("friction=low"); }),
             "--hold friction: found \"low\", expected a number, or one with :measured");
 }
