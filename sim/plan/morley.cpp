@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "data/error.h"
+#include "sim/plan/decaying_solution.h"
 
 namespace flash::sim {
 namespace {
@@ -73,78 +74,44 @@ Eigen::Matrix3d plate_rigidity(double poissons_ratio, const data::Weave& weave, 
   return turn.transpose() * rigidity * turn;
 }
 
-// x <- -matrix^-1 x for many right-hand sides at once: a row of x is contiguous, so the loops run over
-// vectors.
-using Block = Eigen::Matrix<double, Eigen::Dynamic, 32, Eigen::RowMajor>;
-
-void solve_negative(const Eigen::SimplicialLDLT<Sparse>& factor, Block& x) {
-  const Sparse& L = factor.matrixL().nestedExpression();
-  Block y = factor.permutationP() * x;
-  for (int j = 0; j < L.cols(); ++j)
-    for (Sparse::InnerIterator it(L, j); it; ++it)
-      if (it.row() > j) y.row(it.row()).noalias() -= it.value() * y.row(j);
-  y.array().colwise() /= -factor.vectorD().array();
-  for (int j = int(L.cols()) - 1; j >= 0; --j)
-    for (Sparse::InnerIterator it(L, j); it; ++it)
-      if (it.row() > j) y.row(j).noalias() -= it.value() * y.row(it.row());
-  x = factor.permutationP().transpose() * y;
+/// The unit vector t x N in the plane of an edge (see MorleyPlate).
+Eigen::Vector2d normal_of(const Edge& e, const Eigen::Matrix2Xd& plane) {
+  const Eigen::Vector2d t = (plane.col(e.b) - plane.col(e.a)).normalized();
+  return {t.y(), -t.x()};
 }
 
 // Rows of T = -ee^-1 ex, the normal derivative of the free edges in terms of the positions, without their
-// small entries. What is left of a row is moved by the least change that keeps its values for affine
-// positions.
+// small entries. What is left of a row is moved by the least change that gives it `affine`: T times the
+// places of the vertices in the plane.
 Sparse slope_weights(const Sheet& sheet, const std::vector<Edge>& edges, const Eigen::Matrix2Xd& plane,
-                     const Eigen::SimplicialLDLT<Sparse>& factor, const Sparse& ex, double drop_tolerance) {
-  struct Weight {
-    int vertex;
-    double value;
-  };
-  std::vector<std::vector<Weight>> rows(edges.size());
-  Eigen::Matrix3Xd affine = Eigen::Matrix3Xd::Zero(3, Eigen::Index(edges.size()));  // T (1, x, y)
-  std::vector<double> smallest(edges.size());
-  for (std::size_t i = 0; i < edges.size(); ++i) {
+                     const Sparse& ee, const Sparse& ex, const Eigen::MatrixX2d& affine,
+                     double drop_tolerance) {
+  Eigen::VectorXd smallest(Eigen::Index(edges.size()));
+  for (Eigen::Index i = 0; i < smallest.size(); ++i) {
     const Edge& e = edges[i];
     const double area = sheet.triangles[e.left].area + (e.right >= 0 ? sheet.triangles[e.right].area : 0.0);
     smallest[i] = std::sqrt(drop_tolerance) * (plane.col(e.a) - plane.col(e.b)).norm() / area;
   }
-  const auto from_midpoint = [&](const Edge& e, int vertex) -> Eigen::Vector3d {
-    const Eigen::Vector2d length = plane.col(e.b) - plane.col(e.a);
-    const Eigen::Vector2d d = (plane.col(vertex) - 0.5 * (plane.col(e.a) + plane.col(e.b))) / length.norm();
-    return {1.0, d.x(), d.y()};
-  };
-  Block block(ex.rows(), Block::ColsAtCompileTime);
-  for (int first = 0; first < ex.cols(); first += int(block.cols())) {
-    const int count = std::min<int>(int(block.cols()), int(ex.cols()) - first);
-    block.setZero();
-    for (int j = 0; j < count; ++j)
-      for (Sparse::InnerIterator it(ex, first + j); it; ++it) block(it.row(), j) = it.value();
-    solve_negative(factor, block);
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      const Edge& e = edges[i];
-      for (int j = 0; j < count; ++j) {
-        const int vertex = first + j;
-        const double value = block(Eigen::Index(i), j);
-        if (std::abs(value) > 1e-12 * smallest[i])
-          affine.col(Eigen::Index(i)) += value * from_midpoint(e, vertex);
-        if (std::abs(value) >= smallest[i] || vertex == e.a || vertex == e.b || vertex == e.opposite_left)
-          rows[i].push_back({vertex, value});
-      }
-    }
-  }
-  Triplets entries;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
+  Eigen::SparseMatrix<double, Eigen::RowMajor> T = decaying_solution(ee, -ex, smallest, plane);
+  using Row = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
+  for (Eigen::Index i = 0; i < T.rows(); ++i) {
+    const Eigen::Vector2d a = plane.col(edges[i].a), b = plane.col(edges[i].b);
+    const double length = (b - a).norm();
+    const auto from_midpoint = [&](Eigen::Index vertex) -> Eigen::Vector3d {
+      const Eigen::Vector2d d = (plane.col(vertex) - 0.5 * (a + b)) / length;
+      return {1.0, d.x(), d.y()};
+    };
     Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d missing = affine.col(Eigen::Index(i));
-    for (const Weight& w : rows[i]) {
-      const Eigen::Vector3d d = from_midpoint(edges[i], w.vertex);
+    Eigen::Vector3d missing(0.0, affine(i, 0) / length, affine(i, 1) / length);
+    for (Row it(T, i); it; ++it) {
+      const Eigen::Vector3d d = from_midpoint(it.col());
       moments += d * d.transpose();
-      missing -= w.value * d;
+      missing -= it.value() * d;
     }
     const Eigen::Vector3d change = moments.ldlt().solve(missing);
-    for (const Weight& w : rows[i])
-      entries.emplace_back(int(i), w.vertex, w.value + change.dot(from_midpoint(edges[i], w.vertex)));
+    for (Row it(T, i); it; ++it) it.valueRef() += change.dot(from_midpoint(it.col()));
   }
-  return sparse(ex.rows(), ex.cols(), entries);
+  return T;
 }
 
 }  // namespace
@@ -239,9 +206,18 @@ CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
   const Eigen::SimplicialLDLT<Sparse> factor(ee);
   if (factor.info() != Eigen::Success) throw data::input_error("mesh", "bending_model", "singular plate");
 
+  // Affine positions have the slopes n everywhere, by which they cost nothing. T x is for clamped edges of no
+  // slope, which those next to them follow.
+  const Eigen::Matrix2Xd plane = plane_of(sheet).coordinates;
+  Eigen::MatrixX2d normals(edges, 2), affine(Eigen::Index(free.size()), 2);
+  for (Eigen::Index i = 0; i < edges; ++i)
+    normals.row(i) = is_clamped[i] ? normal_of(plate.edges[i], plane) : Eigen::Vector2d::Zero();
+  for (Eigen::Index i = 0; i < affine.rows(); ++i) affine.row(i) = normal_of(free[i], plane);
+  if (!clamped.empty()) affine += factor.solve(Eigen::MatrixX2d(P.transpose() * (plate.ee * normals)));
+
   // The energy at theta = T x + response: for the exact T the minimum over theta, for a truncated one above
   // it by the square of what was dropped.
-  const Sparse T = slope_weights(sheet, free, plane_of(sheet).coordinates, factor, ex, drop_tolerance);
+  const Sparse T = slope_weights(sheet, free, plane, ee, ex, affine, drop_tolerance);
   const Sparse mixed = xe * T, quadratic = T.transpose() * Sparse(ee * T);
   CondensedPlate result;
   result.stiffness = plate.xx + mixed + Sparse(mixed.transpose()) + quadratic;

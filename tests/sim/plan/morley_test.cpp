@@ -214,6 +214,58 @@ TEST(Morley, DroppingSmallWeightsOnlyStiffensAndBarely) {
   }
 }
 
+/// The least energy over the slopes of the edges, those of `clamps` at zero.
+double least_energy(const MorleyPlate& plate, const std::vector<ClampedEdge>& clamps,
+                    const Eigen::VectorXd& w) {
+  std::vector<bool> held(plate.edges.size());
+  for (std::size_t i = 0; i < held.size(); ++i)
+    for (const ClampedEdge& clamp : clamps)
+      if (plate.edges[i].a == clamp.vertex_a && plate.edges[i].b == clamp.vertex_b) held[i] = true;
+  const Eigen::VectorXd slope = deflection(plate.ee, -(plate.xe.transpose() * w), held);
+  return 0.5 * (w.dot(plate.xx * w) + w.dot(plate.xe * slope));
+}
+
+void expect_least_energy(const Sheet& sheet, double nu, const data::Weave& weave,
+                         const std::vector<ClampedEdge>& clamps, double most) {
+  const MorleyPlate plate = morley_plate(sheet, nu, weave);
+  const Sparse S = condensed_plate(sheet, nu, clamps, 1e-6, weave).stiffness;
+  const Eigen::ArrayXd x = sheet.rest.vertices.col(0), y = sheet.rest.vertices.col(1);
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    const Eigen::VectorXd w = ((7.0 + 90.0 * seed) * x + (3.0 + 50.0 * seed) * y + 0.3 * seed).sin();
+    const double ratio = 0.5 * w.dot(S * w) / least_energy(plate, clamps, w);
+    EXPECT_GE(ratio, 1 - 1e-9);
+    EXPECT_LE(ratio, most);
+  }
+  // Positions of a plane keep their slopes, and so have that energy without any more.
+  const Eigen::VectorXd plane = 0.3 * x - 0.2 * y;
+  const double energy = 0.5 * plane.dot(S * plane);
+  EXPECT_NEAR(energy, least_energy(plate, clamps, plane),
+              1e-12 * plane.squaredNorm() * S.diagonal().maxCoeff());
+  EXPECT_EQ(energy > 1e-3, !clamps.empty());
+}
+
+// Sheets of several thousand edges, which are solved part by part.
+TEST(Morley, ALargeSheetHasItsLeastEnergyAndBarelyMore) {
+  const data::TriangleMesh grid = data::rectangle({0.2, 0.2, 32, 32, DiagonalPattern::one_way, 0.25, 1});
+  data::TriangleMesh graded = grid;  // cells with sides of up to one to thirteen
+  graded.vertices = grid.vertices.array() * (0.15 + 0.85 / 0.2 * grid.vertices.array());
+  for (const NamedMesh& of : {NamedMesh{"grid", grid}, NamedMesh{"graded", graded},
+                              NamedMesh{"delaunay", data::delaunay_rectangle(0.2, 0.2, 0.00625, 1)}}) {
+    const Sheet sheet = make_sheet(of.mesh);
+    const std::vector<ClampedEdge> clamps = clamps_at_left_end(sheet);
+    ASSERT_GT(clamps.size(), 30U);
+    const data::Weave woven{3, 1.2, 0.4};
+    const double most = of.name == std::string("graded") ? 1.02 : 1.008;  // see the header
+    for (const double nu : {0.0, 0.3, 0.45}) {
+      SCOPED_TRACE(of.name + (", nu " + std::to_string(nu)));
+      expect_least_energy(sheet, nu, {}, {}, 1.008);
+      expect_least_energy(sheet, nu, {}, clamps, 1.008);
+      expect_least_energy(sheet, nu, woven, {}, most);
+      expect_least_energy(sheet, nu, woven, clamps, most);
+    }
+  }
+}
+
 TEST(Morley, CondensedEnergyIsTheMinimumOverTheEdgeUnknowns) {
   const Sheet sheet = make_sheet(data::rectangle({0.05, 0.03, 5, 3, DiagonalPattern::jittered, 0.25, 4}));
   std::vector<ClampedEdge> clamps = clamps_at_left_end(sheet);
