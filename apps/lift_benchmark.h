@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "data/memory_limit.h"
 #include "sim/batch.h"
 #include "sim/cpu/instruction_level.h"
 
@@ -56,9 +57,10 @@ struct LiftBenchmarkResult {
   double least_bytes = 0, least_flops = 0;  ///< of a step of one environment on a device, without contact
 };
 
-/// Throws data::InputError where a range ends below its start, where the solvers at work need more memory
-/// than there is, or where a device is to take more vertices than any can.
-void check(const LiftBenchmark& benchmark);
+/// Throws data::InputError where a range ends below its start, where the solvers at work and what is kept of
+/// the environments that run at once need more than `memory_limit` [bytes] (0: unknown), or where a device is
+/// to take more vertices than any can.
+void check(const LiftBenchmark& benchmark, double memory_limit = data::memory_limit());
 
 /// Throws as check() does; data::Stopped within a step after `stop` is set.
 LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std::atomic<bool>& stop);

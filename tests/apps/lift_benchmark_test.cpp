@@ -59,5 +59,25 @@ TEST(LiftBenchmark, MoreVerticesThanADeviceTakesAreRefused) {
   EXPECT_EQ(refusal(65'800, Device::cpu), "");
 }
 
+TEST(LiftBenchmark, SizesBeyondTheMemoryAreRefused) {
+  const auto refusal = [](int vertices, int environments, int steps, double limit = 25e9) {
+    return data::input_error_of([&] {
+      check({.vertices = vertices, .environments = environments, .steps = steps, .threads = 2}, limit);
+    });
+  };
+  // 2 * 14 kB for solvers, 1,024 * 450 B for what is kept
+  EXPECT_EQ(
+      refusal(1'000'000, 1'000'000, 1),
+      "--vertices: 1,000,000 of 1,024 environments at once on 2 threads take about 488,800 MB of memory, "
+      "expected at most the 25,000 MB that there are");
+  // 1,024 * 64 B a step
+  EXPECT_EQ(refusal(1000, 1'000'000, 1'000'000),
+            "--steps: 1,000,000 of 1,024 environments at once on 2 threads take about 66,036 MB of memory, "
+            "expected at most the 25,000 MB that there are");
+  EXPECT_EQ(refusal(1'000'000, 1, 1), "");
+  EXPECT_EQ(refusal(1000, 1'000'000, 250), "");
+  EXPECT_EQ(refusal(1'000'000, 1'000'000, 1'000'000, 0), "");  // nothing is known
+}
+
 }  // namespace
 }  // namespace flash::sim
