@@ -81,11 +81,7 @@ CLI::Validator number_between(double low, double high) {
                       [low, high](double value) { return value >= low && value <= high; });
 }
 
-CLI::Validator time_step() {
-  const std::string most = data::format_short(data::max_time_step);
-  return number_check("above 0, to " + most, "a number above 0, at most " + most,
-                      [](double value) { return value > 0 && value <= data::max_time_step; });
-}
+CLI::Validator time_step() { return number_between(data::min_time_step, data::max_time_step); }
 
 CLI::Option* add_vector_option(CLI::App& verb, const std::string& name, std::vector<double>& value,
                                const std::string& meaning) {

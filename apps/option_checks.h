@@ -14,7 +14,7 @@ CLI::Validator positive_number();  ///< finite and above 0
 CLI::Validator number_from(double low);
 CLI::Validator number_between(double low, double high);
 
-/// Of --time-step: above 0, at most data::max_time_step [s].
+/// Of --time-step: from data::min_time_step to data::max_time_step [s].
 CLI::Validator time_step();
 
 /// A point or a vector "x,y,z": the one way to write three numbers.

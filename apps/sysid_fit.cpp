@@ -117,6 +117,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   // One store of motions for the search and what goes on from it.
   grid.rollouts =
       options.rollouts.empty() ? (fs::path(options.start) / "motions").string() : options.rollouts;
+  check_keeps_motions(options.rollouts.empty() ? "--start" : "--rollouts", grid.rollouts);
   sysid::AnswerSettings asked;
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
   asked.horizon = !options.no_horizon;

@@ -73,13 +73,7 @@ void check_options(const GridOptions& options) {
       throw data::InputError("--map: found " + name + ", expected a parameter that is searched");
   if (options.map.size() == 2 && options.map[0] == options.map[1])
     throw data::InputError("--map: found " + options.map[0] + " twice, expected two parameters");
-  if (options.rollouts.empty()) return;
-  try {
-    data::check_folder_writable(options.rollouts);
-  } catch (const data::InputError& error) {
-    throw data::InputError(std::string("--rollouts: ") + error.what() +
-                           ", expected a folder that takes files");
-  }
+  if (!options.rollouts.empty()) check_keeps_motions("--rollouts", options.rollouts);
 }
 
 /// A search that goes on keeps the order of its recordings: its tables stand in it, and the first one names

@@ -19,6 +19,7 @@
 #include "data/recording_digest.h"
 #include "data/seams.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sim/scene/sheet.h"
 #include "sysid/report/recording_names.h"
 
@@ -290,6 +291,14 @@ void warn_of_seams(const data::Recording& recording) {
 int thread_count(const CommonOptions& options) {
   return options.threads > 0 ? options.threads
                              : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void check_keeps_motions(const std::string& option, const std::string& folder) {
+  try {
+    data::check_folder_writable(folder);
+  } catch (const data::InputError& error) {
+    throw data::InputError(option + ": " + error.what() + ", expected a folder that takes files");
+  }
 }
 
 void check_device(const CommonOptions& options, const sysid::ReplaySettings& settings) {

@@ -78,6 +78,10 @@ void warn_of_seams(const data::Recording& recording);
 
 int thread_count(const CommonOptions& options);
 
+/// Before anything is simulated: throws data::InputError naming `option` unless motions can be kept in
+/// `folder`.
+void check_keeps_motions(const std::string& option, const std::string& folder);
+
 /// Throws data::InputError where --device wants a CUDA device that cannot simulate what the options ask for.
 void check_device(const CommonOptions& options, const sysid::ReplaySettings& settings);
 

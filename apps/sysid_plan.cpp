@@ -129,7 +129,11 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   const data::SheetMaterial material = sysid::candidate_at(settings.at, settings.grid).material;
   // Of a search: it keeps what is simulated there.
   std::optional<sysid::MotionStore> store;
-  if (!options.run.empty()) store.emplace((std::filesystem::path(options.run) / "motions").string());
+  if (!options.run.empty()) {
+    const std::string motions = (std::filesystem::path(options.run) / "motions").string();
+    check_keeps_motions("--run", motions);
+    store.emplace(motions);
+  }
   const sysid::MotionStore* const kept = store ? &*store : nullptr;
   std::vector<sysid::PlannedExperiment> experiments;
   for (const data::Recording& recording : recordings) {

@@ -203,7 +203,9 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
                                                          : "areal_density",
                                                      *found.weights[i])
                              : sysid::candidate_at(found.values[i], found.grid));
-  const sysid::MotionStore store((std::filesystem::path(options.run) / "motions").string());
+  const std::string kept = (std::filesystem::path(options.run) / "motions").string();
+  check_keeps_motions("run", kept);
+  const sysid::MotionStore store(kept);
   std::vector<sysid::ReplayResult> motions(candidates.size());
   store.run(replay, candidates,
             [&](std::size_t i, sysid::ReplayResult result) { motions[i] = std::move(result); });

@@ -204,6 +204,15 @@ std::string JsonObject::string(const char* key) const {
   return raw(key).get<std::string>();
 }
 
+std::string JsonObject::choice(const char* key, const std::string& fallback,
+                               const std::vector<std::string>& known) const {
+  const std::string value = string(key, fallback);
+  if (std::find(known.begin(), known.end(), value) != known.end()) return value;
+  std::string expected;
+  for (const std::string& name : known) expected += (expected.empty() ? "" : ", ") + name;
+  throw error(key, "one of " + expected);
+}
+
 bool JsonObject::boolean(const char* key, bool fallback) const {
   if (!has(key)) return fallback;
   if (!raw(key).is_boolean()) throw error(key, "true or false");

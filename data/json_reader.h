@@ -45,6 +45,8 @@ class JsonObject {
   std::string string(const char* key, const std::string& fallback) const {
     return has(key) ? string(key) : fallback;
   }
+  std::string choice(const char* key, const std::string& fallback,
+                     const std::vector<std::string>& known) const;  ///< one of `known`
   Eigen::Vector3d vector3(const char* key, const Eigen::Vector3d& fallback) const;
   std::optional<double> optional_number(const char* key) const;
 

@@ -11,6 +11,7 @@
 #include "data/error.h"
 #include "data/gravity.h"
 #include "data/json_reader.h"
+#include "data/scene_solver.h"
 #include "data/text.h"
 
 namespace flash::data {
@@ -26,6 +27,8 @@ std::string existing_file(const JsonObject& object, const char* key) {
 constexpr double farthest = 1e5;  // from there on rounding is a tenth of a nanometre [m]
 constexpr double fastest = 1e3;   // [m/s]
 constexpr double most_friction = 1e3;
+constexpr double most_mass = 1e6;   // that hangs or is attached [kg]
+constexpr double most_force = 1e9;  // on a vertex: the heaviest mass under the strongest gravity [N]
 
 /// A place or a size, within `farthest` along each axis.
 Eigen::Vector3d near(const JsonObject& object, const char* key, const Eigen::Vector3d& place) {
@@ -40,49 +43,6 @@ Eigen::Isometry3d read_pose(const JsonObject& object, const char* key) {
   if (std::abs(pose.tail<4>().norm() - 1) > 1e-3)
     throw object.error(key, "[x, y, z, qx, qy, qz, qw] with a unit quaternion");
   return from_vector(pose);
-}
-
-std::string read_choice(const JsonObject& object, const char* key, const std::string& fallback,
-                        const std::vector<std::string>& known) {
-  const std::string value = object.string(key, fallback);
-  if (std::find(known.begin(), known.end(), value) != known.end()) return value;
-  std::string expected;
-  for (const std::string& name : known) expected += (expected.empty() ? "" : ", ") + name;
-  throw object.error(key, "one of " + expected);
-}
-
-void read_solver(const JsonObject& file, SceneSolver& solver) {
-  if (file.has("linearsolver")) {
-    const JsonObject object = file.object("linearsolver");
-    object.expect_fields({"type"});
-    solver.linear_solver =
-        read_choice(object, "type", solver.linear_solver,
-                    {"SPARSE_CHOLESKY", "SPARSE_INVERSE", "SPARSE_CHOLESKY_CUDA", "SPARSE_INVERSE_CUDA"});
-  }
-  if (file.has("constraintsolver")) {
-    const JsonObject object = file.object("constraintsolver");
-    object.expect_fields({"type", "linearsolver", "maxforce", "iterations", "tolerance"});
-    solver.constraint_solver = read_choice(object, "type", solver.constraint_solver,
-                                           {"automatic", "NonSmoothNewton", "LiteNonSmoothNewton",
-                                            "NonSmoothNewton_CUDA", "LiteNonSmoothNewton_CUDA"});
-    solver.constraint_linear_solver = read_choice(object, "linearsolver", solver.constraint_linear_solver,
-                                                  {"DENSE_CHOLESKY_EIGEN", "DENSE_CG", "DENSE_PCG_JACOBI",
-                                                   "DENSE_CR", "DENSE_PCR_JACOBI", "MATRIX_FREE"});
-    solver.max_force = object.positive("maxforce", solver.max_force);
-    solver.constraint_iterations = object.integer("iterations", solver.constraint_iterations);
-    if (solver.constraint_iterations < 1) throw object.error("iterations", "a whole number from 1");
-    solver.constraint_tolerance = object.positive("tolerance", solver.constraint_tolerance);
-  }
-  if (file.has("solver")) {
-    const JsonObject object = file.object("solver");
-    object.expect_fields({"type", "iterations", "tolerance", "exit_speed"});
-    solver.integrator = read_choice(object, "type", solver.integrator, {"newton", "projective"});
-    solver.max_iterations = object.integer("iterations", solver.max_iterations);
-    if (solver.max_iterations < 1) throw object.error("iterations", "a whole number from 1");
-    solver.tolerance = object.positive("tolerance", solver.tolerance);
-    if (solver.tolerance > 1) throw object.error("tolerance", "a number above 0, at most 1");
-    solver.exit_speed = object.positive("exit_speed", solver.exit_speed);
-  }
 }
 
 std::optional<double> read_friction(const JsonObject& object) {
@@ -183,7 +143,7 @@ void read_obstacles(const JsonObject& file, Scene& scene) {
     SceneObstacle obstacle;
     obstacle.name = name;
     const std::string shape =
-        read_choice(object, "shape", "", {"plane", "box", "cylinder", "sphere", "capsule", "mesh"});
+        object.choice("shape", "", {"plane", "box", "cylinder", "sphere", "capsule", "mesh"});
     if (shape == "plane") {
       object.expect_fields({"shape", "point", "normal", "friction"});
       obstacle.shape = read_plane(object);
@@ -251,8 +211,12 @@ SceneFixed read_fixed(const JsonObject& object) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!rows[i].is_array() || rows[i].size() != 3 || !rows[i][axis].is_number())
         throw object.error("positions", "one [x, y, z] for each of vertices");
-      fixed.positions(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(axis)) =
-          rows[i][axis].get<double>();
+      const double at = rows[i][axis].get<double>();
+      if (!(std::abs(at) <= farthest))
+        throw input_error(object.source(), object.name_of("positions"),
+                          "found " + format_number(at) + ", expected coordinates of at most " +
+                              format_short(farthest) + " m");
+      fixed.positions(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(axis)) = at;
     }
   return fixed;
 }
@@ -275,17 +239,19 @@ SceneLoad read_load(const JsonObject& object, const Eigen::Vector3d& gravity) {
   SceneLoad load;
   load.vertices = read_vertices(object);
   const auto share = [&](const char* key) {
-    return object.positive(key) / static_cast<double>(load.vertices.size());
+    const double mass = object.positive(key);
+    if (mass > most_mass) throw object.error(key, "at most " + format_short(most_mass) + " kg");
+    return mass / static_cast<double>(load.vertices.size());
   };
   if (object.has("force") + object.has("hung_mass") + object.has("attached_mass") != 1)
     throw object.error("force",
                        "one of force [N] on each vertex, hung_mass and attached_mass [kg] shared by them");
-  if (object.has("force"))
-    load.force = object.vector("force", 3);
-  else if (object.has("hung_mass"))
-    load.force = share("hung_mass") * gravity;
-  else
-    load.attached_mass = share("attached_mass");
+  if (object.has("hung_mass")) load.force = share("hung_mass") * gravity;
+  if (object.has("attached_mass")) load.attached_mass = share("attached_mass");
+  if (!object.has("force")) return load;
+  load.force = object.vector("force", 3);
+  if (!(load.force.cwiseAbs().maxCoeff() <= most_force))
+    throw object.error("force", "components of at most " + format_short(most_force) + " N");
   return load;
 }
 
@@ -401,7 +367,7 @@ void read_pair_friction(const JsonObject& file, Scene& scene) {
   std::set<std::pair<std::string, std::string>> known;
   for (const JsonObject& entry : file.objects("friction")) {
     entry.expect_fields({"a", "b", "friction"});
-    for (const char* key : {"a", "b"}) read_choice(entry, key, "", names);
+    for (const char* key : {"a", "b"}) entry.choice(key, "", names);
     if (!entry.has("friction")) throw entry.error("friction", "a number of 0 or above");
     ScenePairFriction pair{entry.string("a"), entry.string("b"), *read_friction(entry)};
     const auto among = [](const std::vector<std::string>& list, const std::string& name) {
@@ -415,30 +381,7 @@ void read_pair_friction(const JsonObject& file, Scene& scene) {
   }
 }
 
-void read_duration(const JsonObject& file, Scene& scene) {
-  if (file.has("steps") && file.has("duration"))
-    throw input_error(file.source(), "steps", "found duration beside it, expected one of the two");
-  scene.steps_by_default = !file.has("steps") && !file.has("duration");
-  if (file.has("steps")) {
-    const double steps = file.number("steps");
-    if (!(steps >= 0 && steps <= max_steps) || steps != std::floor(steps))
-      throw file.error("steps", "a whole number from 0 to " + format_count(max_steps));
-    scene.steps = static_cast<int>(steps);
-  }
-  if (!file.has("duration")) return;
-  scene.steps = steps_of(file.not_negative("duration"), scene.time_step);
-  if (scene.steps < 0)
-    throw file.error("duration", "at most " + format_count(max_steps) + " steps of " +
-                                     format_short(scene.time_step) + " s, so at most " +
-                                     format_short(max_steps * scene.time_step) + " s");
-}
-
 }  // namespace
-
-int steps_of(double duration, double time_step) {
-  const double steps = std::round(duration / time_step);
-  return steps >= 0 && steps <= max_steps ? static_cast<int>(steps) : -1;
-}
 
 Scene load_scene(const std::string& path) {
   const nlohmann::json json = load_json(path);
@@ -456,12 +399,9 @@ Scene load_scene(const std::string& path) {
         {"timestep", "gravity", "linearsolver", "constraintsolver", "planecollisions", "objects"});
   }
   scene.name = file.string("name", std::filesystem::path(path).stem().string());
-  scene.time_step = file.positive("timestep");
-  if (scene.time_step > max_time_step)
-    throw file.error("timestep", "at most " + format_short(max_time_step) + " s");
   scene.gravity = file.vector("gravity", 3);
   check_gravity(file, scene.gravity);
-  read_duration(file, scene);
+  read_steps(file, scene);
   read_solver(file, scene.solver);
   if (file.has("bending_model"))
     scene.bending_model = parse_bending_model(file.string("bending_model"), path, "bending_model");

@@ -173,6 +173,10 @@ inline constexpr int max_steps = 1'000'000;
 /// The longest step of a simulation [s].
 inline constexpr double max_time_step = 1;
 
+/// The shortest [s]. A place a metre away is known to 1e-16 m, which over h^2 is an acceleration: at 1e-7 s a
+/// thousandth of the Earth's, the tolerance of a step; at 1e-8 s a tenth, and no step can be solved.
+inline constexpr double min_time_step = 1e-7;
+
 /// How many steps of `time_step` a run of `duration` takes [s]; -1 where they are more than max_steps.
 int steps_of(double duration, double time_step);
 

@@ -38,6 +38,32 @@ bool ask_for_own_mesh(const Found& found, const std::vector<KnownError>& held,
   });
 }
 
+double score_of(const Task& task, const std::vector<Replay>& replays,
+                const std::vector<ReplayResult>& motions) {
+  return score_motions(replays, motions, task.grid.score).score;
+}
+
+/// How much likelier a motion of the search's own mesh is than all of cells of no size, as a deviance, where
+/// it is nearer than their mode to what was observed; nothing where it is not. As where searches are compared
+/// (excess_deviance), the nearer of two models says how much a row counts along what tells both apart: by the
+/// measure of a model that misses by far more than noise, hardly anything is likelier than another. `own`, of
+/// the own mesh, and `mode` are on the mesh of the emulator.
+double likelier_by_own_measure(const Task& task, const Found& found, const std::vector<KnownError>& held,
+                               const std::vector<ReplayResult>& own, const std::vector<ReplayResult>& mode) {
+  const std::vector<Replay> replays = replays_of(found.emulator);
+  if (!(score_of(task, replays, own) < score_of(task, replays, mode))) return 0;
+  const MotionChange apart = {{-1, std::make_shared<const Motions>(Motions{replays, own})},
+                              {1, std::make_shared<const Motions>(Motions{replays, mode})}};
+  const MotionLikelihood likelihood(replays, own, task.grid.score, task.settings.repeatability,
+                                    errors_about(found, held), {apart});
+  const double of_mode = likelihood.deviance(motions_in(mode), task.grid.threads);
+  double least = std::isnan(of_mode) ? INFINITY : of_mode;
+  // By this measure they may be likeliest far from their mode.
+  for (const std::vector<Axis>& axes : {found.axes, found.look.posterior.axes})
+    least = std::min(least, deviance_over(found.emulator, axes, likelihood, task.grid).minCoeff());
+  return least - likelihood.deviance(motions_in(own), task.grid.threads);
+}
+
 }  // namespace
 
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
@@ -80,27 +106,37 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
   if (found.emulator.share != own_mesh) {
     const double share = std::exchange(found.emulator.share, own_mesh);
-    const double on_own_mesh = deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(),
+    Eigen::Index likeliest;
+    const double on_own_mesh =
+                     deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(&likeliest),
                  better =
                      std::min(of_points.minCoeff(), std::isnan(of_mode) ? INFINITY : of_mode) - on_own_mesh;
     found.emulator.share = share;
+    // Of the own mesh: the likeliest about the mode, and the search's best, which may be far from there.
+    std::vector<ReplayResult> nearest =
+        motions_at(found.emulator, values_of(found.axes, static_cast<int>(likeliest)), own_mesh);
+    std::vector<ReplayResult> best_there = of_best;
+    for (std::size_t r = 0; r < best_there.size(); ++r)
+      best_there[r].motion = found.emulator.models[r].model.on_its_mesh(of_best[r].motion);
+    if (score_of(task, on_model, best_there) < score_of(task, on_model, nearest))
+      nearest = std::move(best_there);
     std::vector<Motion> mode_on_own;
     for (std::size_t r = 0; r < own.size(); ++r)
       mode_on_own.push_back(found.emulator.models[r].model.on_its_mesh(own[r].motion));
     const bool by_extrapolation_alone =
         better > -kFails && !(likelihood.deviance(mode_on_own, threads) - on_own_mesh < kUnlikely);
-    if (better > kFails || by_extrapolation_alone || ask_for_own_mesh(found, held, likelihood, fitted))
+    if (better > kFails || by_extrapolation_alone || ask_for_own_mesh(found, held, likelihood, fitted) ||
+        likelier_by_own_measure(task, found, held, nearest, mode_there) > kFails)
       return Settled::on_own_mesh;
   }
   // Of values that are as good as equally likely, those whose motion is nearest, on the search's mesh and on
   // that of the answer.
   if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes) &&
-      kFarther * score_motions(task.replays, of_best, task.grid.score).score <
-          score_motions(task.replays, own, task.grid.score).score) {
+      kFarther * score_of(task, task.replays, of_best) < score_of(task, task.replays, own)) {
     std::vector<ReplayResult> on_own_mesh;
     const auto best_there = simulate_at(task, found.emulator, best, false, on_own_mesh);
-    if (best_there && kFarther * score_motions(on_model, *best_there, task.grid.score).score <
-                          score_motions(on_model, mode_there, task.grid.score).score) {
+    if (best_there &&
+        kFarther * score_of(task, on_model, *best_there) < score_of(task, on_model, mode_there)) {
       set_estimate(found.look.posterior, found.axes, best);
       return Settled::by_emulator;
     }

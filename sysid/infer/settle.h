@@ -15,9 +15,10 @@ enum class Settled { by_emulator, by_points, on_own_mesh, elsewhere };
 /// likeliest point where points have more than half. Where `best` is likely too and its motion far nearer to
 /// what was observed, it is the estimate.
 /// On the own mesh: its points are likelier than all that is extrapolated to cells of no size, or as likely
-/// and the mode is far from likely on that mesh, or the recordings lie there along the error of the mesh.
-/// What changes abruptly with the mesh is not extrapolated. Elsewhere: the `best` of the search, beyond the
-/// emulator's grid, is likelier than all. `found` is as it was in these two.
+/// and the mode is far from likely on that mesh, or the recordings lie there along the error of the mesh, or
+/// a motion there is nearer and, by its own measure, likelier than all that is extrapolated. What changes
+/// abruptly with the mesh is not extrapolated. Elsewhere: the `best` of the search, beyond the emulator's
+/// grid, is likelier than all. `found` is as it was in these two.
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
                const std::vector<KnownError>& held);
 

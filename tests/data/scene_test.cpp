@@ -207,8 +207,12 @@ TEST_F(SceneFiles, DirectionsMayBeOfAnyLength) {
 
 TEST_F(SceneFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed(kPublished, "/gravitiy", 1), "gravitiy: unknown field (did you mean \"gravity\"?)");
-  EXPECT_EQ(changed(kPublished, "/timestep", 0), "timestep: found 0, expected a number above 0");
-  EXPECT_EQ(changed(kPublished, "/timestep", 1e9), "timestep: found 1000000000.0, expected at most 1 s");
+  const std::string steps = ", expected a number from 1e-07 to 1 [s]";
+  EXPECT_EQ(changed(kPublished, "/timestep", 0), "timestep: found 0" + steps);
+  EXPECT_EQ(changed(kPublished, "/timestep", 1e-300), "timestep: found 1e-300" + steps);
+  EXPECT_EQ(changed(kPublished, "/timestep", 9e-8), "timestep: found 9e-08" + steps);
+  EXPECT_EQ(changed(kPublished, "/timestep", 1.1), "timestep: found 1.1" + steps);
+  EXPECT_EQ(changed(kPublished, "/timestep", "soon"), "timestep: found \"soon\", expected a number");
   EXPECT_EQ(changed(kPublished, "/constraintsolver/type", "Newton"),
             "constraintsolver.type: found \"Newton\", expected one of automatic, NonSmoothNewton, "
             "LiteNonSmoothNewton, "
@@ -250,6 +254,14 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/0/hung_mass", 1),
             "objects.cloth.loads[0].force: found [1,2,3], expected one of force [N] on each vertex, "
             "hung_mass and attached_mass [kg] shared by them");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/positions/1", {0, -1e300, 0}),
+            "objects.cloth.fixed[0].positions: found -1e+300, expected coordinates of at most 1e+05 m");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/0/force", {0, -1e20, 0}),
+            "objects.cloth.loads[0].force: found [0,-1e+20,0], expected components of at most 1e+09 N");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/1/hung_mass", 1e20),
+            "objects.cloth.loads[1].hung_mass: found 1e+20, expected at most 1e+06 kg");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/2/attached_mass", 1e300),
+            "objects.cloth.loads[2].attached_mass: found 1e+300, expected at most 1e+06 kg");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/2/attached_mass", -1),
             "objects.cloth.loads[2].attached_mass: found -1, expected a number above 0");
   EXPECT_EQ(changed(kFlash, "/end_effectors/left/grasps/0/object", "rag"),

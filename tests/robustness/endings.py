@@ -35,6 +35,7 @@ def write_inputs(folder):
                           ("before_start", scene(0.05, keyframes=[-1])), ("too_many", scene(0.05, steps=2 ** 32)),
                           ("too_long", scene(0.05, duration=1e9)), ("two_lengths", scene(0.05, steps=2, duration=0.02))):
         (folder / f"{name}.json").write_text(json.dumps(content))
+    (folder / "too_short_steps.json").write_text(json.dumps(scene(0.05) | {"timestep": 1e-300}))
     (folder / "twice.json").write_text('{"schema": "flash-scene/1", "timestep": 0.01, "timestep": 0.02}')
     (folder / "loop").symlink_to("loop")
     write_calibrations(folder)
@@ -77,6 +78,9 @@ def refusals(sim, sysid, calib):
         ([*grid, "--bending", "1e-4,2e-4", "--resume", "--force"], ["--resume", "--force"]),
         ([*run, "too_long.json", "-o", "out"], ["duration", "at most 1,000,000 steps"]),
         ([*run, "twice.json", "-o", "out"], ["timestep", "given twice"]),
+        ([*run, "too_short_steps.json", "-o", "out"], ["timestep: found 1e-300, expected a number from 1e-07 to 1"]),
+        *[([*words, "--time-step", "1e-300"], ["--time-step", 'found "1e-300"', "from 1e-07 to 1"])
+          for words in (bench, synth, [*grid, "--bending", "1e-5,1e-4"])],
         ([*run, "short.json", "--steps", "4294967296", "-o", "out"], ["--steps", "from 0 to 1,000,000"]),
         ([*run, "short.json", "--steps", "-1", "-o", "out"], ["--steps", "found \"-1\"", "from 0 to 1,000,000"]),
         ([*run, "short.json", "--duration", "1e9", "-o", "out"], ["--duration", "1,000,000 steps"]),
@@ -117,7 +121,7 @@ def refusals(sim, sysid, calib):
         ([*grid, "--bending", "1e-4,,2e-4"], ["--bending", '"" is not a number']),
         ([sysid, "import", "raw", "--trajectory", "none", "--mesh", "sheet:0.2x0.2:0.05", "--grasp", "vertices:1,", "-o", "out"],
          ["--grasp", "vertices:1,", "whole numbers"]),
-        ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "above 0"]),
+        ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "from 1e-07 to 1"]),
         ([*bench, "--young-min", "5", "--young-max", "3"], ["--young-max", "found 3", "at least the 5"]),
         ([*synth, "--hold", "foo=1"], ["--hold foo", "unknown parameter"]),
         ([*synth, "--hold", "friction=0.3", "--hold", "friction=0.4"], ["--hold friction", "given twice"]),
@@ -418,6 +422,23 @@ def check_fit(options, folder):
     yield done.returncode == REFUSED and 'did you mean "poisson"' in done.stderr, f"fit --hold poison: {done.stderr}"
 
 
+def check_kept_motions(options, folder):
+    """A search whose motions can be kept no longer is named with its option before anything is simulated."""
+    recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"  # of check_fit
+    # No permission keeps an administrator out; a file in the place of the folder does, as a read-only disk would.
+    (run / "motions").rename(run / "moved")
+    (run / "motions").write_text("")
+    refused = f"{run / 'motions'}: cannot be written: Not a directory, expected a folder that takes files\n"
+    for words, option in ((["fit", recording, "--start", run], "--start"),
+                          (["plan", recording, "--asset", asset, "--run", run], "--run"), (["predict", run, recording], "run")):
+        done = program.call(options.sysid, *words, "--quiet", "-o", folder / f"kept_{words[0]}")
+        yield (done.returncode == REFUSED and done.stderr.endswith(f"flash-sysid: {option}: {refused}"),
+               f"{words[0]} of a search that keeps no motions: exit code {done.returncode}: {done.stderr}")
+        yield not (folder / f"kept_{words[0]}").exists(), f"{words[0]}: something is left of what was refused"
+    (run / "motions").unlink()
+    (run / "moved").rename(run / "motions")
+
+
 def check_tuned(options, folder):
     """A tuned asset has the score that a replay with the search's options gives. Of other options it is said that they are
     others. What cannot be used is reported all the same, and exported with the exit code of the search."""
@@ -459,7 +480,7 @@ def main():
         program.synthesize(options.sysid, folder)
         for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_two_runs, check_defaults,
                       check_resume, check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay,
-                      check_seams, check_fit, check_tuned):
+                      check_seams, check_fit, check_kept_motions, check_tuned):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds
