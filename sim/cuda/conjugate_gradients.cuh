@@ -88,11 +88,6 @@ __device__ inline void put(const Numbers3& v, float* vector, int vertex) {
   own[1] = v.y;
   own[2] = v.z;
 }
-/// Into a vector on chip of all blocks.
-__device__ inline void put_in_all(const Numbers3& v, float* vector, int vertex) {
-  put(v, vector, vertex);
-  for (int k = 1; k < team_blocks(); ++k) put(v, in_block(vector, other_block(k)), vertex);
-}
 __device__ inline Numbers3 scaled_sum(const Numbers3& a, float scale, const Numbers3& b) {
   return {a.x + scale * b.x, a.y + scale * b.y, a.z + scale * b.z};
 }
@@ -184,7 +179,7 @@ __device__ LinearEnd conjugate_gradients(const FrontTables& fronts, const SheetT
         [&](int i, const Numbers3& left, float(&squares)[1]) {
           put(left, residual, i);
           if (v.solved_on_chip)
-            put_in_all(left, preconditioned, i);
+            put_in_all(reinterpret_cast<Numbers3*>(preconditioned) + i, left);
           else
             put(left, preconditioned, i);
           squares[0] += product(left, left);

@@ -80,22 +80,24 @@ class ChunkStream {
     for (int k = 0; k < width; ++k) {
       const int4 what = what_[k];
       const unsigned slot = free_ + k * Slot::size, to = slot + 16 * lane();
-      const char* upper = factor_ + static_cast<long>(what.x) * tile;
-      const char* lower = upper + static_cast<long>(next_row_of(what.y)) * tile;
-      const bool two_rows = next_row_of(what.y) != 0, two_columns = what.z & 1;
-      // Eight lanes have a square: 16 bytes of it or, in its place, zeros.
-      const int own_squares = squares_of(what.y) >> lane() / 8;
-      const auto bytes = [&](int k) { return 16 * (own_squares >> tile_squares * k & 1); };
+      if (const int squares = squares_of(what.y); squares != 0) {
+        const char* upper = factor_ + static_cast<long>(what.x) * tile;
+        const char* lower = upper + static_cast<long>(next_row_of(what.y)) * tile;
+        const bool two_rows = next_row_of(what.y) != 0, two_columns = what.z & 1;
+        // Eight lanes have a square: 16 bytes of it or, in its place, zeros.
+        const int own_squares = squares >> lane() / 8;
+        const auto bytes = [&](int k) { return 16 * (own_squares >> tile_squares * k & 1); };
 #pragma unroll
-      for (int p = 0; p < parts; ++p) {
-        copy_to_chip(to + p * part, upper + p * part, bytes(0), policy_);
-        if (two_columns) copy_to_chip(to + tile + p * part, upper + tile + p * part, bytes(1), policy_);
-        if (two_rows) copy_to_chip(to + 2 * tile + p * part, lower + p * part, bytes(2), policy_);
-        if (two_rows && two_columns)
-          copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, bytes(3), policy_);
+        for (int p = 0; p < parts; ++p) {
+          copy_to_chip(to + p * part, upper + p * part, bytes(0), policy_);
+          if (two_columns) copy_to_chip(to + tile + p * part, upper + tile + p * part, bytes(1), policy_);
+          if (two_rows) copy_to_chip(to + 2 * tile + p * part, lower + p * part, bytes(2), policy_);
+          if (two_rows && two_columns)
+            copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, bytes(3), policy_);
+        }
+        copy_to_chip<8>(slot + Slot::input_table + 8 * lane(), gathers_ + what.w);
+        if (what.z >= 0) copy_to_chip<8>(slot + Slot::result_table + 8 * lane(), gathers_ + (what.z >> 1));
       }
-      copy_to_chip<8>(slot + Slot::input_table + 8 * lane(), gathers_ + what.w);
-      if (what.z >= 0) copy_to_chip<8>(slot + Slot::result_table + 8 * lane(), gathers_ + (what.z >> 1));
       if (lane() < Slot::chunk_bytes / 16)
         copy_to_chip<16>(to + Slot::chunk, next_ + chunk_words * k + 1 + lane());
     }
@@ -164,6 +166,13 @@ __device__ int run_chunks(unsigned first_slot, const Vector& vector, float (&sum
   int4 chunks[width];
 #pragma unroll
   for (int k = 0; k < width; ++k) chunks[k] = load_int4(slot(k) + Slot::chunk);
+  // Warps that have nothing to do leave the processor to those that others wait for.
+  if (chunks[0].y == 0) return chunks[width - 1].x;
+  if constexpr (width > 1)
+    if (chunks[1].y == 0) {
+      run_chunks<parts, backward, 1>(first_slot, vector, sums);
+      return chunks[width - 1].x;
+    }
   int2 from[width];
 #pragma unroll
   for (int k = 0; k < width; ++k) from[k] = load_int2(slot(k) + Slot::input_table + 8 * lane());

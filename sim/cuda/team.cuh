@@ -41,18 +41,16 @@ __device__ inline int team_warps() { return block_warps * team_blocks(); }
 __device__ inline int team_rank() { return 32 * team_warp() + lane(); }
 __device__ inline int team_size() { return block_threads * team_blocks(); }
 
-/// A barrier for the team, behind which each thread sees what the others wrote. racecheck takes no notice of
-/// a cluster's barrier: with FLASH_RACECHECK barriers of the block stand around it.
+/// A barrier for the team, behind which each thread sees what the others wrote. Of a block one thread makes
+/// visible to the other blocks what all of its threads wrote: that waits for what is under way, and takes
+/// longer where every warp does it. racecheck takes no notice of a cluster's barrier: with FLASH_RACECHECK a
+/// barrier of the block stands behind it too.
 __device__ inline void synchronize_team() {
-  if (team_blocks() == 1) {
-    __syncthreads();
-    return;
-  }
-#ifdef FLASH_RACECHECK
   __syncthreads();
-#endif
+  if (team_blocks() == 1) return;
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
-  asm volatile("barrier.cluster.arrive.release;\nbarrier.cluster.wait.acquire;" ::: "memory");
+  if (threadIdx.x == 0) asm volatile("fence.acq_rel.cluster;" ::: "memory");
+  asm volatile("barrier.cluster.arrive.relaxed;\nbarrier.cluster.wait.acquire;" ::: "memory");
 #endif
 #ifdef FLASH_RACECHECK
   __syncthreads();
@@ -71,15 +69,17 @@ __device__ Number* in_block(Number* on_chip, [[maybe_unused]] int block) {
 #endif
 }
 
-/// The k-th block behind this one, around.
-__device__ inline int other_block(int k) { return (block_of_team() + k) & (team_blocks() - 1); }
-
-/// Writes a number to the same place on chip in all blocks of the team. Its own block sees it behind a
-/// barrier of the block, the others behind one of the team.
+/// Writes a number to the same place on chip in all blocks of the team, of which there are a power of two: so
+/// a few instructions do for any team. Its own block sees it behind a barrier of the block, the others behind
+/// one of the team.
 template <typename Number>
 __device__ void put_in_all(Number* on_chip, const Number& value) {
   *on_chip = value;
-  for (int k = 1; k < team_blocks(); ++k) *in_block(on_chip, other_block(k)) = value;
+#pragma unroll
+  for (int half = 1; half < most_team_blocks; half *= 2)
+    if (half < team_blocks())
+#pragma unroll
+      for (int k = half; k < 2 * half; ++k) *in_block(on_chip, block_of_team() ^ k) = value;
 }
 
 /// Where a team keeps what all of its threads read and write: on chip of its only block, in a copy on chip of

@@ -25,7 +25,8 @@ struct alignas(16) SolveChunk {
 
   // To have it sent to the chip.
   int first_tile = 0;   ///< of the factor
-  int rows = 0;         ///< chunk_rows: from there to the tile below it, and what of the tiles is not zero
+  int rows = 0;         ///< chunk_rows: from there to the tile below it, and what of the tiles is not zero;
+                        ///< nothing of them where there is nothing to do
   int columns = 0;      ///< chunk_columns: how many tiles side by side, and where results go
   int input_table = 0;  ///< place of the first input in SolvePlan::gathers
   // To multiply by it.

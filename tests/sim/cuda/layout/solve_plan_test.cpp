@@ -140,6 +140,7 @@ class Team {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(chunk_width);
     while (true) {
       const SolveChunk& chunk = solve_.chunks[next_[warp]++];
+      EXPECT_EQ(chunk.inputs > 0, squares_of(chunk.rows) != 0);
       Eigen::VectorXd inputs = Eigen::VectorXd::Zero(chunk_width);
       for (int k = 0; k < chunk.inputs; ++k) {
         const int at = chunk.input_table + k;
