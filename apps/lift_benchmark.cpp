@@ -111,6 +111,10 @@ int cells_of(const LiftBenchmark& benchmark) {
 
 }  // namespace
 
+int environments_together(const LiftBenchmark& benchmark) {
+  return benchmark.alone ? 1 : benchmark.environments;
+}
+
 void check(const LiftBenchmark& benchmark, double memory_limit) {
   const auto increasing = [](const char* option, double low, double high) {
     if (!(low <= high))
@@ -125,8 +129,8 @@ void check(const LiftBenchmark& benchmark, double memory_limit) {
     throw data::InputError("--vertices: found " + data::format_count(static_cast<std::size_t>(vertices)) +
                            ", expected at most " + data::format_count(cuda::most_vertices) +
                            " on a CUDA device; use --device cpu");
-  const int at_work = std::min(benchmark.threads, benchmark.environments);
-  const int at_once = std::min(environments_at_once, benchmark.environments);
+  const int at_once = std::min(environments_at_once, environments_together(benchmark));
+  const int at_work = std::min(benchmark.threads, at_once);
   const double of_vertices =
       vertices * (at_work * solver_bytes_per_vertex + at_once * batch_bytes_per_vertex);
   const double of_steps = batch_bytes_per_step * benchmark.steps * at_once;
@@ -179,7 +183,8 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     result.start_seconds = seconds_since(start);
     start = std::chrono::steady_clock::now();
   }
-  replay_in_batches(plan, counts.size(), environments_at_once, settings, environment,
+  const int at_once = std::min(environments_at_once, environments_together(benchmark));
+  replay_in_batches(plan, counts.size(), at_once, settings, environment,
                     [&](std::size_t i, const Batch& batch, int e) {
                       for (const StepStats& step : batch.stats(e)) {
                         counts[i].iterations += step.iterations;
@@ -212,7 +217,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   result.slowest_membrane_stiffness = slowest_material.membrane_stiffness;
   result.slowest_bending_rigidity = slowest_material.bending_rigidity;
   if (benchmark.device == Device::cuda) {
-    result.step_milliseconds = 1e3 * result.wall_seconds / benchmark.steps;
+    result.step_milliseconds = 1e3 * result.wall_seconds * environments_together(benchmark) / total;
     if (benchmark.projective) {
       // Of the factor, which each solve reads: two an iteration, and one for the report.
       const ProjectiveMatrix matrix =
@@ -234,7 +239,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     return result;
   }
   result.step_milliseconds =
-      1e3 * result.wall_seconds * std::min(benchmark.threads, benchmark.environments) / total;
+      1e3 * result.wall_seconds * std::min(benchmark.threads, environments_together(benchmark)) / total;
   if (total < 1 || benchmark.projective) return result;
 
   const Environment typical = lift_environment(benchmark, plan->sheet, schedule, benchmark.environments / 2);

@@ -14,6 +14,7 @@ namespace flash::sim {
 struct LiftBenchmark {
   int vertices = 1000;  ///< about; the mesh has the next square number
   int environments = 64;
+  bool alone = false;  ///< one environment after the other, each by itself
   int steps = 250;
   int threads = 1;
   InstructionLevel level = highest_instruction_level();  ///< of the kernels
@@ -43,7 +44,7 @@ struct LiftBenchmarkResult {
   double start_seconds = 0;      ///< of a device, until it has taken the first step of one material
   double wall_seconds = 0;       ///< after that
   double step_milliseconds = 0;  ///< wall time a step and environment, times the threads at work; on a device
-                                 ///< a step of all environments
+                                 ///< a step of all environments at once, which is one where they are alone
   double converged_share = 0;    ///< of environment-steps
   double residual_max = 0;
   double iterations = 0;                  ///< Newton's, a step
@@ -56,6 +57,9 @@ struct LiftBenchmarkResult {
   std::vector<PhaseShare> phase_shares;     ///< of a device
   double least_bytes = 0, least_flops = 0;  ///< of a step of one environment on a device, without contact
 };
+
+/// Environments that are simulated together.
+int environments_together(const LiftBenchmark& benchmark);
 
 /// Throws data::InputError where a range ends below its start, where the solvers at work and what is kept of
 /// the environments that run at once need more than `memory_limit` [bytes] (0: unknown), or where a device is

@@ -30,13 +30,16 @@ struct Run {
   sim::LiftBenchmarkResult result;
 
   /// What all environments move or compute at least per second.
-  double rate(double each) const { return each * benchmark.environments / (1e-3 * result.step_milliseconds); }
+  double rate(double each) const {
+    return each * environments_together(benchmark) / (1e-3 * result.step_milliseconds);
+  }
 };
 
 nlohmann::ordered_json json_of(const Run& run) {
   const sim::LiftBenchmarkResult& result = run.result;
   nlohmann::ordered_json json = {{"vertices", result.vertices},
                                  {"environments", run.benchmark.environments},
+                                 {"alone", run.benchmark.alone},
                                  {"start_seconds", result.start_seconds},
                                  {"wall_seconds", result.wall_seconds},
                                  {"step_ms", result.step_milliseconds},
@@ -67,9 +70,10 @@ void print_cpu(const Run& run) {
   double accounted = 0;
   for (const sim::BenchmarkPhase& phase : result.phases)
     accounted += phase.calls_per_step * phase.milliseconds_per_call;
-  std::printf("%d vertices, %d environments, %d steps, %d threads, kernels for %s: %.1f s\n", result.vertices,
-              run.benchmark.environments, run.benchmark.steps, run.benchmark.threads,
-              sim::to_string(run.benchmark.level), result.wall_seconds);
+  std::printf("%d vertices, %d environments%s, %d steps, %d threads, kernels for %s: %.1f s\n",
+              result.vertices, run.benchmark.environments, run.benchmark.alone ? " each alone" : "",
+              run.benchmark.steps, run.benchmark.threads, sim::to_string(run.benchmark.level),
+              result.wall_seconds);
   std::printf("converged %.2f %% of the steps, worst residual %.2g, %.2f %s iterations per step\n",
               100 * result.converged_share, result.residual_max, result.iterations,
               run.benchmark.projective ? "local-global" : "Newton");
@@ -101,10 +105,12 @@ void print_device(const Run& run, const sim::DeviceRates& rates) {
   const sim::LiftBenchmarkResult& result = run.result;
   const double bytes = run.rate(result.least_bytes), flops = run.rate(result.least_flops),
                devices = static_cast<double>(std::max<std::size_t>(1, run.benchmark.cuda_devices.size()));
-  std::printf("%8d %6d %12.3f %8.2f %% %8.2f %8.2f %8.2f %8.2f %9.0f %7.1f %% %9.0f %7.1f %%\n",
-              result.vertices, run.benchmark.environments, result.step_milliseconds,
-              100 * result.converged_share, result.iterations, result.iterations_max, result.solves,
-              result.factorizations, 1e-9 * bytes, 100 * bytes / (devices * rates.copied_bytes), 1e-9 * flops,
+  const std::string environments = run.benchmark.alone ? std::to_string(run.benchmark.environments) + " x 1"
+                                                       : std::to_string(run.benchmark.environments);
+  std::printf("%8d %6s %12.3f %8.2f %% %8.2f %8.2f %8.2f %8.2f %9.0f %7.1f %% %9.0f %7.1f %%\n",
+              result.vertices, environments.c_str(), result.step_milliseconds, 100 * result.converged_share,
+              result.iterations, result.iterations_max, result.solves, result.factorizations, 1e-9 * bytes,
+              100 * bytes / (devices * rates.copied_bytes), 1e-9 * flops,
               100 * flops / (devices * rates.single_flops));
   std::printf("%15s", "");
   const char* separator = " ";
@@ -182,6 +188,8 @@ void add_bench_verb(CLI::App& app, Action& action) {
   };
   counts("--vertices", options->vertices, "Approximate numbers of vertices of the towel", 4);
   counts("--envs", options->environments, "Numbers of materials", 1);
+  verb.add_flag("--alone", benchmark.alone,
+                "One material after the other, each by itself; the time is the mean of theirs");
   verb.add_option("--steps", benchmark.steps, "Time steps per material")
       ->check(whole_number(1, 1'000'000))
       ->capture_default_str();

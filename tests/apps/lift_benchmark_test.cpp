@@ -46,6 +46,18 @@ TEST(LiftBenchmark, TakesTheIterationsOfItsBaseline) {
                   << found.dump(2);
 }
 
+TEST(LiftBenchmark, EnvironmentsAloneTakeTheIterationsOfThoseTogether) {
+  LiftBenchmark benchmark = {.vertices = 100, .environments = 3, .steps = 20, .threads = 2};
+  const LiftBenchmarkResult together = run_lift_benchmark(benchmark, false);
+  benchmark.alone = true;
+  const LiftBenchmarkResult alone = run_lift_benchmark(benchmark, false);
+  EXPECT_EQ(counts_of(alone), counts_of(together));
+  EXPECT_EQ(alone.iterations_max, together.iterations_max);
+  EXPECT_EQ(alone.residual_max, together.residual_max);
+  EXPECT_DOUBLE_EQ(alone.step_milliseconds,
+                   1e3 * alone.wall_seconds / (benchmark.environments * benchmark.steps));
+}
+
 // Before anything is made, and wherever there is no device.
 TEST(LiftBenchmark, MoreVerticesThanADeviceTakesAreRefused) {
   const auto refusal = [](int vertices, Device device) {
