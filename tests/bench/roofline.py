@@ -24,7 +24,7 @@ def main():
 
 def point_of(run):
     """Flops per byte and flops per second of a run, by the least that its counts need."""
-    seconds = 1e-3 * run["step_ms"] / run["environments"]
+    seconds = 1e-3 * run["step_ms"] / (1 if run["alone"] else run["environments"])
     return run["least_flops"] / run["least_bytes"], run["least_flops"] / seconds
 
 
