@@ -369,7 +369,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         summary.last_motion = scene.time_step * stop_motion(bodies);
         const bool over = std::all_of(bodies.begin(), bodies.end(),
                                       [](const SceneBody& body) { return motion_is_over(body.environment); });
-        done = over && summary.last_motion <= *scene.rest_motion;
+        done = over && converged && summary.last_motion <= *scene.rest_motion;
         summary.at_rest = done;
       }
       if (frames.count(step) || (scene.rest_motion && (done || step == steps))) {

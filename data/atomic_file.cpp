@@ -108,7 +108,8 @@ void write_together(const std::vector<FileText>& files) {
 void remove_leftovers(const std::string& folder) {
   std::vector<std::filesystem::path> left;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-    if (is_temporary(entry.path())) left.push_back(entry.path());
+    if (is_temporary(entry.path()) && std::filesystem::is_regular_file(entry.symlink_status()))
+      left.push_back(entry.path());
   for (const std::filesystem::path& path : left) std::filesystem::remove(path);
 }
 

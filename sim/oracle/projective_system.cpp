@@ -41,7 +41,7 @@ void add_body(const Sheet& sheet, const Body& body, const data::SheetMaterial& m
   }
   const Eigen::SparseMatrix<double> bending =
       material.bending_model == data::BendingModel::plate
-          ? plate_bending_stiffness(alone, material.poissons_ratio, 1e-2, material.weave)
+          ? condensed_plate(alone, material.poissons_ratio, {}, 1e-2, material.weave).stiffness
           : isometric_bending_stiffness(alone);
   for (int column = 0; column < bending.outerSize(); ++column)
     for (Eigen::SparseMatrix<double>::InnerIterator entry(bending, column); entry; ++entry)

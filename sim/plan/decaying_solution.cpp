@@ -95,24 +95,28 @@ Patch patch_about(std::span<const int> columns, int rings, const Sparse& A, cons
   return patch;
 }
 
-/// Whether a solution on the patch would move the rows about it by little, if they were free.
-bool has_decayed(const Patch& patch, const Block& x, const Sparse& A, const Eigen::VectorXd& limits) {
+/// How far a solution on the patch would move the rows about it, if they were free: the most, by what they
+/// may move.
+double moves_about(const Patch& patch, const Block& x, const Sparse& A, const Eigen::VectorXd& limits) {
+  double most = 0;
   for (auto entry = patch.beyond.begin(); entry != patch.beyond.end();) {
     const int row = entry->row();
     Eigen::Matrix<double, 1, block_columns> residual = Eigen::Matrix<double, 1, block_columns>::Zero();
     for (; entry != patch.beyond.end() && entry->row() == row; ++entry)
       residual += entry->value() * x.row(entry->col());
-    if (!(residual.cwiseAbs().maxCoeff() <= share_of_limit * limits[row] * A.coeff(row, row))) return false;
+    const double move = residual.cwiseAbs().maxCoeff() / (share_of_limit * limits[row] * A.coeff(row, row));
+    most = std::max(most, std::isnan(move) ? INFINITY : move);
   }
-  return true;
+  return most;
 }
 
-/// Adds the entries of the solution in these columns; false, with some of them added, where it has not
-/// decayed at the border of the patch.
-bool add_entries(const Patch& patch, std::span<const int> columns, const Sparse& A, const Sparse& B,
-                 const Eigen::VectorXd& limits, const std::vector<int>& place_of, Triplets& entries) {
+/// Adds the entries of the solution in these columns, and returns the most of moves_about. Above one, where
+/// the patch is too small, some of them are missing.
+double add_entries(const Patch& patch, std::span<const int> columns, const Sparse& A, const Sparse& B,
+                   const Eigen::VectorXd& limits, const std::vector<int>& place_of, Triplets& entries) {
   const Eigen::SimplicialLDLT<Sparse> factor(patch.matrix);
   Block block(patch.matrix.rows(), block_columns);
+  double most = 0;
   for (std::size_t first = 0; first < columns.size(); first += block_columns) {
     const int count = std::min(block_columns, int(columns.size() - first));
     block.setZero();
@@ -120,7 +124,8 @@ bool add_entries(const Patch& patch, std::span<const int> columns, const Sparse&
       for (Sparse::InnerIterator it(B, columns[first + j]); it; ++it)
         block(place_of[it.row()], j) = it.value();
     solve(factor, block);
-    if (!has_decayed(patch, block, A, limits)) return false;
+    most = std::max(most, moves_about(patch, block, A, limits));
+    if (!(most <= 1)) return most;
     for (int j = 0; j < count; ++j)
       for (Sparse::InnerIterator it(B, columns[first + j]); it; ++it)
         if (const double value = block(place_of[it.row()], j); !(std::abs(value) >= limits[it.row()]))
@@ -130,7 +135,7 @@ bool add_entries(const Patch& patch, std::span<const int> columns, const Sparse&
         if (const double value = block(Eigen::Index(i), j); std::abs(value) >= limits[patch.rows[i]])
           entries.emplace_back(patch.rows[i], columns[first + j], value);
   }
-  return true;
+  return most;
 }
 
 }  // namespace
@@ -142,19 +147,24 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> decaying_solution(const Sparse& A, 
   std::iota(columns.begin(), columns.end(), 0);
   std::vector<std::span<int>> clusters;
   add_clusters(places, columns, clusters);
-  // What one cluster needs, the next does too. Limits of zero take all rows that are joined.
-  int rings = (limits.array() > 0).all() ? 8 : int(A.rows());
+  // Limits of zero take all rows that are joined. What one cluster needs the next needs too, about.
+  const int least_rings = (limits.array() > 0).all() ? 8 : int(A.rows());
+  constexpr double far_less = 1e-2;
+  int rings = least_rings;
   Triplets entries;
   std::vector<int> place_of(A.rows(), -1);
   for (const std::span<int> cluster : clusters)
     for (bool done = false; !done;) {
       const Patch patch = patch_about(cluster, rings, A, B, place_of);
       const std::size_t before = entries.size();
-      done = add_entries(patch, cluster, A, B, limits, place_of, entries);
+      const double moves = add_entries(patch, cluster, A, B, limits, place_of, entries);
+      done = moves <= 1;
       for (const int row : patch.rows) place_of[row] = -1;
       if (!done) {
         entries.resize(before);
         rings += rings / 4;
+      } else if (moves < far_less) {
+        rings = std::max(least_rings, rings - rings / 5);
       }
     }
   Eigen::SparseMatrix<double, Eigen::RowMajor> solution(B.rows(), B.cols());

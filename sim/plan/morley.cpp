@@ -1,5 +1,6 @@
 #include "sim/plan/morley.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -93,6 +94,10 @@ Sparse slope_weights(const Sheet& sheet, const std::vector<Edge>& edges, const E
     smallest[i] = std::sqrt(drop_tolerance) * (plane.col(e.a) - plane.col(e.b)).norm() / area;
   }
   Eigen::SparseMatrix<double, Eigen::RowMajor> T = decaying_solution(ee, -ex, smallest, plane);
+  // Three vertices take the change below. Where a fourth has a small weight, it may lie on a stiff triangle.
+  T.prune([&](Eigen::Index edge, Eigen::Index vertex, double weight) {
+    return vertex != edges[edge].opposite_right || std::abs(weight) >= smallest[edge];
+  });
   using Row = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
   for (Eigen::Index i = 0; i < T.rows(); ++i) {
     const Eigen::Vector2d a = plane.col(edges[i].a), b = plane.col(edges[i].b);
@@ -112,6 +117,25 @@ Sparse slope_weights(const Sheet& sheet, const std::vector<Edge>& edges, const E
     for (Row it(T, i); it; ++it) it.valueRef() += change.dot(from_midpoint(it.col()));
   }
   return T;
+}
+
+// Of deflections x^2, xy, y^2 and their sums: by how much of the least energy over all slopes that of the
+// slopes T x is above it, at most. Such a deflection costs little, and its slopes grow with the distance: so
+// far weights that are dropped count most here.
+double excess_energy(const Sparse& xx, const Sparse& xe, const Sparse& ee,
+                     const Eigen::SimplicialLDLT<Sparse>& factor, const Sparse& T,
+                     const Eigen::Matrix2Xd& plane) {
+  const Eigen::Matrix2Xd from_middle = plane.colwise() - plane.rowwise().mean();
+  const auto x = from_middle.row(0).transpose().array(), y = from_middle.row(1).transpose().array();
+  Eigen::MatrixX3d bent(plane.cols(), 3);
+  bent << x * x, x * y, y * y;
+  const Eigen::MatrixX3d slopes = -factor.solve(Eigen::MatrixX3d(xe.transpose() * bent)),
+                         missing = T * bent - slopes;
+  const Eigen::Matrix3d least = bent.transpose() * (xx * bent + xe * slopes),
+                        more = missing.transpose() * (ee * missing);
+  const double excess =
+      Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d>(more, least).eigenvalues().maxCoeff();
+  return std::isfinite(excess) ? excess : 0.0;  // a sheet of a few triangles has no energy when bent so
 }
 
 }  // namespace
@@ -221,6 +245,7 @@ CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
   const Sparse mixed = xe * T, quadratic = T.transpose() * Sparse(ee * T);
   CondensedPlate result;
   result.stiffness = plate.xx + mixed + Sparse(mixed.transpose()) + quadratic;
+  result.excess = excess_energy(plate.xx, xe, ee, factor, T, plane);
   result.force = data::Points::Zero(vertices, 3);
   if (!clamped.empty()) {
     const Eigen::MatrixXd fixed = P.transpose() * (plate.ee * slopes), response = -factor.solve(fixed);
@@ -233,7 +258,12 @@ CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
 
 Sparse plate_bending_stiffness(const Sheet& sheet, double poissons_ratio, double drop_tolerance,
                                const data::Weave& weave) {
-  return condensed_plate(sheet, poissons_ratio, {}, drop_tolerance, weave).stiffness;
+  constexpr double most_excess = 0.01, least_tolerance = 1e-15;
+  while (true) {
+    CondensedPlate plate = condensed_plate(sheet, poissons_ratio, {}, drop_tolerance, weave);
+    if (plate.excess <= most_excess || drop_tolerance < least_tolerance) return std::move(plate.stiffness);
+    drop_tolerance /= 10;
+  }
 }
 
 }  // namespace flash::sim

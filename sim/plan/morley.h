@@ -40,20 +40,23 @@ struct CondensedPlate {
   Eigen::SparseMatrix<double> stiffness;  ///< vertices x vertices [1/m^2]
   data::Points force;                     ///< of the clamped edges [1/m]; zero without any
   double constant = 0.0;
+  double excess = 0.0;  ///< by how much of it dropping raises the energy of a sheet bent evenly, at most
 };
 
 /// The edge unknowns at their minimum theta = T x + (clamps), T = -ee^-1 ex, free edges natural. T decays by
 /// about a factor of three a cell. Entries below sqrt(drop_tolerance) |e| / (A_left + A_right) are dropped
-/// but at vertices of the triangles beside the edge; the rest is moved so that affine positions keep their
+/// but at a, b and the vertex on the left of the edge; the rest is moved so that affine positions keep their
 /// slopes. The stiffness stays positive semi-definite, zero on affine positions, and above the exact one by
-/// the square of what was dropped. At the default that is at most 0.2 % on any mode up to nu = 0.3 and 0.8 %
-/// at nu = 0.45, with about 100 entries a row; 1.6 % on woven cells with sides of one to thirteen.
+/// the square of what was dropped. On cells of like sides that is at most 0.2 % on any mode up to nu = 0.3
+/// and 0.8 % at nu = 0.45 with 1e-6, for about 100 entries a row; see `excess` for others.
 /// drop_tolerance = 0 is exact. Otherwise time grows with the number of vertices (see decaying_solution).
 CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
                                const std::vector<ClampedEdge>& clamped, double drop_tolerance = 1e-6,
                                const data::Weave& weave = {});
 
-/// The stiffness without clamped edges, D = 1 [1/m^2].
+/// The stiffness without clamped edges, D = 1 [1/m^2]. `drop_tolerance` is made smaller by tens until the
+/// excess is at most 1 %. On cells of like sides 1e-6 is small enough. Long cells, and sheets that twist much
+/// more easily than they bend, take up to three times the entries a row.
 Eigen::SparseMatrix<double> plate_bending_stiffness(const Sheet& sheet, double poissons_ratio,
                                                     double drop_tolerance = 1e-6,
                                                     const data::Weave& weave = {});

@@ -256,7 +256,14 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     for (std::size_t r = 0; r < replays.size(); ++r)
       answer.horizons[r] = predictability_horizon(replays[r], candidate, store);
     drop_beyond_horizons(answer.horizons, results);
-    for (std::size_t r = 0; r < replays.size(); ++r) drop_beyond_horizon(answer.horizons[r], replays[r]);
+    for (std::size_t r = 0; r < replays.size(); ++r)
+      if (const int dropped = drop_beyond_horizon(answer.horizons[r], replays[r]); dropped > 0)
+        answer.warnings.push_back(
+            (replays.size() > 1 ? "recording " + std::to_string(r + 1) + ": " : std::string()) +
+            "the motion of the best candidate cannot be predicted from " +
+            data::format_short(*answer.horizons[r]) + " s on: " + std::to_string(dropped) + " of " +
+            std::to_string(replays[r].observations.size()) +
+            " keyframes carry no weight; --no-horizon keeps them");
     answer.best = best_of(results);
     best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   }

@@ -22,15 +22,20 @@ std::optional<double> predictability_horizon(const Replay& replay, const ReplayC
   return std::nullopt;
 }
 
-void drop_beyond_horizon(std::optional<double> horizon, Replay& replay) {
-  if (!horizon) return;
+int drop_beyond_horizon(std::optional<double> horizon, Replay& replay) {
+  if (!horizon) return 0;
   std::vector<Observation> kept = replay.observations;
   double weight = 0;
+  int dropped = 0;
   for (Observation& observation : kept) {
-    if (observation.t >= *horizon) observation.weight = 0;
+    const bool beyond = observation.t >= *horizon;
+    dropped += beyond && observation.seen() && observation.weight > 0;
+    if (beyond) observation.weight = 0;
     if (observation.seen()) weight += observation.weight;
   }
-  if (weight > 0) replay.observations = std::move(kept);
+  if (!(weight > 0)) return 0;
+  replay.observations = std::move(kept);
+  return dropped;
 }
 
 }  // namespace flash::sysid

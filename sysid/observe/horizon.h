@@ -14,7 +14,8 @@ std::optional<double> predictability_horizon(const Replay& replay, const ReplayC
                                              const MotionStore& store, double limit = 1e-3,
                                              double perturbation = 1e-3);
 
-/// Takes the weight from the keyframes at and beyond the horizon. Where none would remain, all stay.
-void drop_beyond_horizon(std::optional<double> horizon, Replay& replay);
+/// Takes the weight from the keyframes at and beyond the horizon, and returns how many had one. Where none
+/// would remain, all stay.
+int drop_beyond_horizon(std::optional<double> horizon, Replay& replay);
 
 }  // namespace flash::sysid

@@ -57,6 +57,20 @@ TEST(WriteTogether, WritesAllOrNone) {
 }
 
 // A program that was killed leaves them; one that still writes has written within the day.
+TEST(RemoveLeftovers, TakesTemporaryFilesOfAnyFolderBelowAndNothingElse) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "notes.1-2.tmp/own");
+  folder.write("results.csv.12-3.tmp", "");
+  folder.write("notes.1-2.tmp/own/mine", "");
+  folder.write("notes.1-2.tmp/own/frame.12-4.tmp", "");
+  std::filesystem::create_symlink(folder / "notes.1-2.tmp/own/mine", folder / "link.1-2.tmp");
+  remove_leftovers(folder / ".");
+  EXPECT_FALSE(std::filesystem::exists(folder / "results.csv.12-3.tmp"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "notes.1-2.tmp/own/frame.12-4.tmp"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "notes.1-2.tmp/own/mine"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "link.1-2.tmp"));
+}
+
 TEST(RemoveOldLeftovers, TakesTemporaryFilesOfADayAgoAndNothingElse) {
   namespace fs = std::filesystem;
   const TemporaryFolder folder;

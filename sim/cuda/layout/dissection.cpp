@@ -30,6 +30,13 @@ class Dissector {
         Split other = split(set, axis);
         if (other.separator.size() < best.separator.size()) best = std::move(other);
       }
+      // Parts that are not joined need no separator. But a front without columns of its own would not pass up
+      // what its children pass to it.
+      if (best.separator.empty()) {
+        std::vector<int>& half = best.halves[best.halves[0].empty() ? 1 : 0];
+        best.separator.push_back(half.back());
+        half.pop_back();
+      }
       node.children = {add(best.halves[0]), add(best.halves[1])};
       node.vertices = std::move(best.separator);
     }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
 #include <cmath>
@@ -212,6 +213,41 @@ TEST(Morley, DroppingSmallWeightsOnlyStiffensAndBarely) {
       EXPECT_LE(ratio, 1.005) << strip.name;  // the worst mode, see the header
     }
   }
+}
+
+// Weights decay slowly along long cells, and where a sheet twists easily.
+TEST(Morley, LongCellsAndEasyTwistsKeepTheWeightsThatTheyNeed) {
+  const auto grid = [](int x, int y) {
+    return data::rectangle({0.2, 0.2, x, y, DiagonalPattern::one_way, 0.25, 1});
+  };
+  int rough = 0;
+  for (const NamedMesh& of : {NamedMesh{"cells of like sides", grid(20, 20)}, {"long cells", grid(8, 40)}})
+    for (const data::Weave& weave : {data::Weave{}, {3, 1.2, 0.4}, {20, 0.1, 0}}) {
+      SCOPED_TRACE(of.name + (", twisting ratio " + std::to_string(weave.twisting_ratio)));
+      const Sheet sheet = make_sheet(of.mesh);
+      const CondensedPlate dropped = condensed_plate(sheet, 0.45, {}, 1e-6, weave);
+      const Sparse exact = condensed_plate(sheet, 0.45, {}, 0, weave).stiffness,
+                   kept = plate_bending_stiffness(sheet, 0.45, 1e-6, weave);
+      const Eigen::ArrayXd x = sheet.rest.vertices.col(0).array() - 0.1,
+                           y = sheet.rest.vertices.col(1).array() - 0.1;
+      Eigen::MatrixX3d bent(x.size(), 3);
+      bent << x * x, x * y, y * y;
+      const Eigen::Matrix3d least = bent.transpose() * exact * bent,
+                            more = bent.transpose() * (dropped.stiffness * bent - exact * bent);
+      const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> excess(more, least);
+      EXPECT_NEAR(dropped.excess, excess.eigenvalues().maxCoeff(), 1e-6 * (1 + dropped.excess));
+      if (dropped.excess > 0.01)
+        ++rough;
+      else
+        EXPECT_EQ((kept - dropped.stiffness).norm(), 0);
+      for (unsigned seed = 0; seed < 12; ++seed) {
+        const Eigen::VectorXd w = ((2.0 + 9.0 * seed) * x + (3.0 + 5.0 * (seed % 5)) * y + 0.3 * seed).sin();
+        const double ratio = w.dot(kept * w) / w.dot(exact * w);
+        EXPECT_GE(ratio, 1 - 1e-9);
+        EXPECT_LE(ratio, 1.01);
+      }
+    }
+  EXPECT_EQ(rough, 4);  // all but two of like sides
 }
 
 /// The least energy over the slopes of the edges, those of `clamps` at zero.

@@ -51,8 +51,18 @@ TEST(Horizon, IsWhereTwoNearlyEqualMotionsPart) {
 TEST(Horizon, ARecordingIsNeverLeftWithoutKeyframes) {
   Replay replay;
   replay.observations = {{1.0, data::Points::Zero(5, 3), 1}};
-  drop_beyond_horizon(0.5, replay);
+  EXPECT_EQ(drop_beyond_horizon(0.5, replay), 0);
   EXPECT_EQ(replay.observations[0].weight, 1);
+}
+
+TEST(Horizon, KeyframesBeyondItAreCounted) {
+  Replay replay;
+  for (const double t : {0.0, 1.0, 2.0, 3.0}) replay.observations.push_back({t, data::Points::Zero(5, 3), 1});
+  replay.observations[3].weight = 0;
+  EXPECT_EQ(drop_beyond_horizon(std::nullopt, replay), 0);
+  EXPECT_EQ(drop_beyond_horizon(1.0, replay), 2);
+  EXPECT_EQ(replay.observations[0].weight, 1);
+  EXPECT_EQ(replay.observations[1].weight, 0);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ TEST(Dissection, EveryVertexComesOnceAndHalvesDoNotTouch) {
     const std::vector<DissectionNode> nodes = dissect(pattern, plan->sheet.rest.vertices, 6);
     std::vector<int> owner(pattern.size, -1), parent(nodes.size(), -1);
     for (std::size_t n = 0; n < nodes.size(); ++n) {
+      EXPECT_FALSE(nodes[n].vertices.empty());  // of parts that are not joined too
       for (const int vertex : nodes[n].vertices) {
         EXPECT_EQ(owner[vertex], -1);
         owner[vertex] = static_cast<int>(n);
