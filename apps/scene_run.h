@@ -29,7 +29,8 @@ struct SceneSummary {
   double wall_seconds = 0;
   bool interrupted = false;
   double last_motion = 0;       ///< quasistatic: of the vertex that moved farthest in the last step [m]
-  std::optional<bool> at_rest;  ///< whether that is below the scene's bound; none: not quasistatic
+  std::optional<bool> at_rest;  ///< whether that is below the scene's bound after a step that is solved;
+                                ///< none: not quasistatic
   std::vector<std::string> notices;
   std::vector<std::string> warnings;  ///< of solids that lock or collapse, of holds, and of vertices held
                                       ///< inside an obstacle or that start there

@@ -169,8 +169,11 @@ int run(const RunOptions& options) {
       !sim::accepted(unconverged_share, summary.residual_max) || moves || summary.collapsed_elements > 0;
   const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
   if (moves && !summary.interrupted)
-    std::cerr << "flash-sim: warning: not at rest after " << summary.steps << " steps: a vertex still moves "
-              << data::format_short(summary.last_motion) << " m a step; allow more steps or longer ones\n";
+    std::cerr << "flash-sim: warning: not at rest after " << summary.steps << " steps: "
+              << (summary.last_motion > scene.rest_motion.value_or(0)
+                      ? "a vertex still moves " + data::format_short(summary.last_motion) +
+                            " m a step; allow more steps or longer ones\n"
+                      : "nothing moves, but the last step is not solved; take shorter steps\n");
   for (const std::string& warning : summary.warnings) std::cerr << "flash-sim: warning: " << warning << '\n';
   if (summary.unconverged_steps > 0)
     std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps

@@ -261,7 +261,7 @@ Sparse plate_bending_stiffness(const Sheet& sheet, double poissons_ratio, double
   constexpr double most_excess = 0.01, least_tolerance = 1e-15;
   while (true) {
     CondensedPlate plate = condensed_plate(sheet, poissons_ratio, {}, drop_tolerance, weave);
-    if (plate.excess <= most_excess || drop_tolerance < least_tolerance) return std::move(plate.stiffness);
+    if (plate.excess <= most_excess || drop_tolerance < least_tolerance) return plate.stiffness;
     drop_tolerance /= 10;
   }
 }
