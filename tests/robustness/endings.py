@@ -399,7 +399,7 @@ def check_fit(options, folder):
     """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
     recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
     mesh = ["--mesh", "sheet:0.2x0.2:0.04"]  # that of the recording has cells of 0.05
-    program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "1e-5:1e-3:5:log", *mesh,
+    program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "1e-5:1e-3:9:log", *mesh,
                  "--no-solver-check", "--no-horizon", "--no-plan", "--quiet", "-o", run)
     line = [options.sysid, "fit", recording, "--start", run, "--no-solver-check", "--no-horizon", "--no-plan", "--quiet"]
     done = program.call(*line, "--hold", "poisson", "-o", folder / "fitted")
