@@ -173,7 +173,9 @@ int run(const RunOptions& options) {
               << (summary.last_motion > scene.rest_motion.value_or(0)
                       ? "a vertex still moves " + data::format_short(summary.last_motion) +
                             " m a step; allow more steps or longer ones\n"
-                      : "nothing moves, but the last step is not solved; take shorter steps\n");
+                  : summary.unconverged_steps > 0
+                      ? "nothing moves, but steps are not solved; take shorter ones\n"
+                      : "nothing moves, but a grasp or a trajectory goes on; allow more steps\n");
   for (const std::string& warning : summary.warnings) std::cerr << "flash-sim: warning: " << warning << '\n';
   if (summary.unconverged_steps > 0)
     std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps

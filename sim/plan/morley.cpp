@@ -133,9 +133,16 @@ double excess_energy(const Sparse& xx, const Sparse& xe, const Sparse& ee,
                          missing = T * bent - slopes;
   const Eigen::Matrix3d least = bent.transpose() * (xx * bent + xe * slopes),
                         more = missing.transpose() * (ee * missing);
-  const double excess =
-      Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d>(more, least).eigenvalues().maxCoeff();
-  return std::isfinite(excess) ? excess : 0.0;  // a sheet of a few triangles has no energy when bent so
+  // One row of cells has the same y^2 everywhere, so that some of them cost nothing but rounding.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> modes(least);
+  const Eigen::Vector3d& costs = modes.eigenvalues();  // ascending
+  const auto counted = (costs.array() > 1e-9 * costs[2]).count();
+  if (!(costs[2] > 0) || counted == 0) return 0.0;
+  const Eigen::MatrixXd each =
+      modes.eigenvectors().rightCols(counted) * costs.tail(counted).cwiseSqrt().cwiseInverse().asDiagonal();
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(each.transpose() * more * each)
+      .eigenvalues()
+      .maxCoeff();
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
 
 /// The stiffness without clamped edges, D = 1 [1/m^2]. `drop_tolerance` is made smaller by tens until the
 /// excess is at most 1 %. On cells of like sides 1e-6 is small enough. Long cells, and sheets that twist much
-/// more easily than they bend, take up to three times the entries a row.
+/// more easily than they bend, take several times the entries a row.
 Eigen::SparseMatrix<double> plate_bending_stiffness(const Sheet& sheet, double poissons_ratio,
                                                     double drop_tolerance = 1e-6,
                                                     const data::Weave& weave = {});
