@@ -53,19 +53,16 @@ data::TriangleMesh load_mesh(const std::string& spec) {
   return mesh;
 }
 
-/// Of a sheet that is made on the spot; of others what clouds usually ask for [m]
-double cell_of(const std::string& spec, const data::TriangleMesh& mesh) {
-  constexpr double kUsual = 0.01;
+/// Of a sheet that is made on the spot.
+void check_cell(const std::string& spec, const data::TriangleMesh& mesh) {
   const std::vector<std::string_view> parts = data::split(spec, ":");
-  if (!data::is_mesh_spec(spec) || parts.size() < 3) return kUsual;
-  const double cell = data::parse_number(parts[2]).value_or(kUsual);
+  if (!data::is_mesh_spec(spec) || parts.size() < 3) return;
   const double shorter =
       (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).head<2>().minCoeff();
-  if (cell > shorter)
+  if (data::parse_number(parts[2]).value_or(0) > shorter)
     throw option_error(
         "mesh", spec,
         "cells of at most the shorter side of the sheet, " + data::format_short(shorter) + " m");
-  return cell;
 }
 
 data::Trajectory load_gripper(const std::string& path) {
@@ -113,8 +110,9 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
   if (options.mesh.empty()) throw data::InputError("import: expected --mesh, as sheet:0.3x0.24:0.01");
   settings.mesh_spec = options.mesh;
   settings.mesh = load_mesh(options.mesh);
+  check_cell(options.mesh, settings.mesh);
   settings.grasp = parse_grasp(options.grasp);
-  settings.grasp.within = options.within.value_or(1.2 * cell_of(options.mesh, settings.mesh));
+  settings.grasp.within = options.within.value_or(data::Selection().within);
   settings.crop = parse_crop(options.crop);
   settings.trajectory = load_gripper(options.trajectory);
   settings.trajectory_path = options.trajectory;

@@ -15,7 +15,7 @@ struct ImportOptions {
   std::string times;                ///< as frame_times reads them
   std::string mesh;                 ///< mesh spec or file
   std::string grasp = "corner";     ///< as parse_grasp reads it
-  std::optional<double> within;     ///< of the grasp [m]; empty: 1.2 cells of a sheet
+  std::optional<double> within;     ///< of the grasp [m]; empty: 0.02
   std::array<std::string, 3> crop;  ///< along x, y and z "LOW:HIGH" [m], either side may be empty
 };
 

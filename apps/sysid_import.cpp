@@ -174,7 +174,7 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--grasp", texts.grasp,
                    "What is grasped: corner, corner:I,J, vertices:A,B,... or position")
       ->capture_default_str();
-  verb->add_option("--grasp-within", options->within, "Size of the grasped patch [m]; without it 1.2 cells")
+  verb->add_option("--grasp-within", options->within, "Size of the grasped patch [m]; without it 0.02")
       ->check(positive_number());
   verb->add_option("--tool-at", options->tool_at, "What is under the tool centre point at the start")
       ->check(CLI::IsMember({"corner", "patch"}))

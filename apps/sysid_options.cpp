@@ -117,6 +117,14 @@ void add_cpu_option(CLI::App& verb, CommonOptions& options) {
       ->capture_default_str();
 }
 
+void add_grasp_cell_option(CLI::App& verb, std::optional<double>& grasp_cell) {
+  verb.add_option(
+          "--grasp-cell", grasp_cell,
+          "Edge length of the cells at the grasps [m]; without it, a fifth of those of the mesh or of "
+          "the patch, where the mesh names no pattern; 0: the mesh as it is")
+      ->check(number_from(0));
+}
+
 void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   CLI::App& group = *verb.add_option_group("Replay and score");
   group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
@@ -139,6 +147,7 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
       .add_option("--grasp-within", options.grasp_within,
                   "Size of the grasped patch in place of the recording's [m]")
       ->check(positive_number());
+  add_grasp_cell_option(group, options.grasp_cell);
   group.add_flag("--clamp-slopes", options.clamp_slopes,
                  "A clamped patch does not bend: it holds the sheet's slope as well as its place");
   CLI::Option* const layers =
@@ -191,6 +200,7 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
     settings.self_contact =
         sim::SelfContact{.thickness = options.self_contact, .friction = options.layer_friction};
   if (options.grasp_within > 0) settings.grasp_within = options.grasp_within;
+  settings.grasp_cell = options.grasp_cell;
   settings.grasp_shape = data::parse_grasp_shape(options.grasp_shape);  // empty: as recorded
   settings.solver.stop = &stop_on_signals();
   if (verb.count("--from") > 0) settings.score_from = options.from;

@@ -38,6 +38,7 @@ struct ReplayOptions {
   double tolerance = 1e-3;
   std::string grasp_shape;
   double grasp_within = 0;  ///< 0: the recording's
+  std::optional<double> grasp_cell{};
   bool clamp_slopes = false;
   double self_contact = 0;     ///< [m]; 0: none
   double layer_friction = -1;  ///< below 0: that of the object
@@ -48,6 +49,7 @@ struct ReplayOptions {
   bool two_sided = false;
   std::vector<std::string> shared;
 };
+void add_grasp_cell_option(CLI::App& verb, std::optional<double>& grasp_cell);
 void add_replay_options(CLI::App& verb, ReplayOptions& options);
 sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions& options, int threads);
 sysid::ScoreSettings score_settings(const ReplayOptions& options);

@@ -245,6 +245,7 @@ void add_synth_verb(CLI::App& app, Action& action) {
   verb->add_option("--grasp-within", synth.grasp_within, "Size of the grasped patch [m]")
       ->check(positive_number())
       ->capture_default_str();
+  add_grasp_cell_option(*verb, synth.grasp_cell);
   verb->add_option("--grasp-shape", options->grasp_shape, "How the patch sits in the fingers")
       ->check(CLI::IsMember({"clamp", "point"}))
       ->capture_default_str();

@@ -1,11 +1,13 @@
 #include "sim/cuda/device_plan.h"
 
 #include <algorithm>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
 #include "sim/cuda/layout/solve_plan.h"
 #include "sim/cuda/most_vertices.h"
+#include "sim/law/least_weight.h"
 
 namespace flash::sim::cuda {
 
@@ -88,6 +90,8 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
       upload(std::vector<float>(layout.step_values.begin(), layout.step_values.end()), floats_);
   sheet.stand_in = upload(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end()), floats_);
   sheet.vertex_area = upload(layout.vertex_area, doubles_);
+  sheet.least_area = least_vertex_share *
+                     std::accumulate(layout.vertex_area.begin(), layout.vertex_area.end(), 0.0) / layout.size;
   sheet.edge_count = static_cast<int>(layout.edge_lengths.size());
   sheet.edge_lengths = upload(layout.edge_lengths, doubles_);
   sheet.hinge_count = layout.hinge_count;

@@ -57,7 +57,7 @@ struct Iterate {
   double line_friction;  ///< at those of the iterate from which the line leads here [J]
   double residual;       ///< norm [N]
   double rounding;       ///< of it, by that of positions where friction turns [N]
-  double worst;          ///< largest residual of a vertex beyond its rounding, as a share of its weight
+  double worst;  ///< largest residual of a vertex beyond its rounding, over its weight (least_weight.h)
 };
 
 __device__ inline Triple force_at(const double* force, int i) {
@@ -293,10 +293,11 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
     at.residuals[3 * i] = left.x;
     at.residuals[3 * i + 1] = left.y;
     at.residuals[3 * i + 2] = left.z;
-    const double squared = dot(left, left);
+    const double squared = dot(left, left),
+                 judged = fmax(mass, step.material->areal_density * tables.least_area);
     added[residual] += squared;
     added[rounding] += uncertain * uncertain;
-    worst = worse_of(worst, (sqrt(squared) - uncertain) / mass);
+    worst = worse_of(worst, (sqrt(squared) - uncertain) / judged);
   });
   worst = worst_over_team(worst, partial);
   return {sums[potential], sums[friction], sums[line_friction], sums[residual], sums[rounding], worst};

@@ -22,7 +22,8 @@ struct SheetTables {
   const double* step_values;        ///< of a step, the first two numbers of each lane and then the others
   const float *single_step_values, *stand_in;
   const double* vertex_area;
-  int edge_count;  ///< the first pairs
+  double least_area;  ///< as which the weight of a vertex counts where it is judged, at least [m^2]
+  int edge_count;     ///< the first pairs
   const double* edge_lengths;
   int hinge_count;
   const int* hinge_vertices;

@@ -1,9 +1,11 @@
 #include "sim/newton/step_problem.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "data/worst.h"
+#include "sim/law/least_weight.h"
 
 namespace flash::sim {
 
@@ -60,6 +62,8 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
   constexpr double vertex_tolerance = 30;  ///< tolerance of a vertex as a multiple of the body's
   for (std::size_t b = 0; b < laws.size(); ++b) {
     const Body& body = laws[b].place.body;
+    const double least_mass =
+        least_vertex_share * rows_of(body, potential.mass()).sum() / static_cast<double>(body.vertex_count);
     double squared_rounding = 0;
     for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i) {
       const VertexConstraint* c = iterate.contacts.find(i);
@@ -67,7 +71,7 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
                                            : std::numeric_limits<double>::epsilon() *
                                                  iterate.positions.row(i).norm() * norm(c->slip_stiffness);
       if (!(iterate.residual.row(i).norm() <=
-            vertex_tolerance * tolerance * potential.mass()[i] * gravity + rounding))
+            vertex_tolerance * tolerance * std::max(potential.mass()[i], least_mass) * gravity + rounding))
         return false;
       squared_rounding += rounding * rounding;
     }

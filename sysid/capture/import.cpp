@@ -18,6 +18,7 @@
 #include "data/writable.h"
 #include "sysid/capture/clocks.h"
 #include "sysid/capture/lying_sheet.h"
+#include "sysid/replay/grasp_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -282,8 +283,7 @@ data::Recording import_recording(const ImportSettings& settings) {
   if (corner) {
     const data::Points& rest = recording.mesh.vertices;
     Eigen::RowVector3d held = corner_of(rest, *corner);
-    if (settings.tool_at_patch)
-      held = rest(data::select_vertices(recording, recording.grasps[0]), Eigen::all).colwise().mean();
+    if (settings.tool_at_patch) held = patch_middle(recording, recording.grasps[0]);
     const double heading = settings.heading.value_or(heading_of_clouds(keyframes, gripper));
     recording.base_from_object = start_pose(rest, *corner, held, gripper, table_height, heading);
     for (const std::string& line : compare_sides(recording, keyframes, heading)) notices.push_back(line);

@@ -17,6 +17,7 @@
 #include "data/procedural_mesh.h"
 #include "data/text.h"
 #include "sysid/capture/render_depth.h"
+#include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/replay/recorded_grasp.h"
 #include "sysid/replay/replay.h"
@@ -149,11 +150,8 @@ data::Recording recording_of(const data::TriangleMesh& mesh, const std::string& 
     grasp.gripper = hand.name;
     grasp.select = hand.select;
     grasp.shape = settings.grasp_shape;
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    const std::vector<int> held = data::select_vertices(recording, grasp);
-    for (int vertex : held)
-      centre += mesh.vertices.row(vertex).transpose() / static_cast<double>(held.size());
-    recording.trajectories[hand.name] = smooth_motion(centre, hand.displacement, settings);
+    recording.trajectories[hand.name] =
+        smooth_motion(patch_middle(recording, grasp).transpose(), hand.displacement, settings);
     recording.grasps.push_back(grasp);
   }
   std::mt19937_64 random(settings.seed);
@@ -286,7 +284,10 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   replay.settings.solver = solver;
   replay.settings.clamp_slopes = settings.clamp_slopes;
   replay.settings.self_contact = settings.self_contact;
-  sim::Sheet sheet = sim::make_sheet(mesh);
+  replay.settings.grasp_cell = settings.grasp_cell;
+  grade_towards_grasps(replay.settings, replay.recording);
+  replay.surface = replay.recording.mesh;
+  sim::Sheet sheet = sim::make_sheet(replay.surface);
   if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
   replay.plan = sim::make_sheet_plan(sheet);
   replay.steps = steps_in(settings.duration + settings.rest, solver.time_step);
@@ -307,7 +308,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   }
   for (data::RecordedKeyframe& keyframe : synthetic.recording.keyframes) {
     const double t = keyframe.time + settings.time_offset;
-    std::vector<data::TriangleMesh> surfaces = {mesh};
+    std::vector<data::TriangleMesh> surfaces = {replay.surface};
     surface_at(motion, t, surfaces[0].vertices);
     if (settings.gripper_half_extents.minCoeff() > 0)
       for (const data::RecordedGrasp& grasp : synthetic.recording.grasps) {

@@ -116,8 +116,8 @@ Eigen::MatrixXd errors_of_solution(const Replay& replay, const LinearObservation
   const auto add = [&](double share, const Replay& finer, const ReplayResult& there) {
     if (there.finite) columns.push_back(share * (places.displacements(finer, there.motion) - own));
   };
-  if (const std::optional<Replay> finer = on_half_the_cell(replay))
-    add(kMesh, *finer, store.run(*finer, candidate));
+  const Replay finer_mesh = on_half_the_cell(replay);
+  add(kMesh, finer_mesh, store.run(finer_mesh, candidate));
   for (const FinerSolution& finer : finer_solutions(finer_settings({replay}), candidate, store))
     add(1, finer.replays.front(), finer.motions.front());
   Eigen::MatrixXd errors(places.rows(), static_cast<Eigen::Index>(columns.size()));

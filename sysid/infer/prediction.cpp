@@ -238,8 +238,9 @@ std::vector<KnownError> errors_of_prediction(const Replay& replay, const GridSet
     if (to->results.front().finite)
       errors.push_back({{{-times, from}, {times, std::move(to)}}, true, true, {}, name});
   };
-  if (const std::optional<Replay> half = solved.no_cells ? on_half_the_cell(replay) : std::nullopt) {
-    const auto to = std::make_shared<const Motions>(Motions{{*half}, {store.run(*half, candidate)}});
+  if (solved.no_cells) {
+    const Replay half = on_half_the_cell(replay);
+    const auto to = std::make_shared<const Motions>(Motions{{half}, {store.run(half, candidate)}});
     // Four equal parts correct by all of the step to cells of no size, and leave half of it unsure: twice the
     // last third, as in an answer.
     constexpr int kParts = 4;

@@ -7,6 +7,7 @@
 #include "data/procedural_mesh.h"
 #include "data/tet_faces.h"
 #include "data/text.h"
+#include "sysid/replay/grasp_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -46,23 +47,25 @@ std::string scaled_cell(const std::string& specification, double factor) {
   return scaled;
 }
 
-std::optional<Replay> on_half_the_cell(const Replay& replay) {
+Replay on_half_the_cell(const Replay& replay) {
   ReplaySettings settings = replay.settings;
-  if (!replay.recording.start_mesh.empty()) return std::nullopt;
+  if (are_graded(replay.recording, settings)) {
+    data::Recording finer = replay.recording;
+    refine_grasps(settings, 0.25, finer);
+    return on_mesh(replay, std::move(finer), settings);
+  }
   settings.mesh = scaled_cell(replay.recording.mesh_spec, 0.5);
-  if (!settings.mesh.empty()) return make_replay(replay, settings);
-  if (!replay.recording.is_solid()) return std::nullopt;
-  Replay finer = replay;
-  finer.recording = with_halved_tets(replay.recording);
-  return make_replay(finer, settings);
+  if (!settings.mesh.empty() && replay.recording.start_mesh.empty()) return make_replay(replay, settings);
+  settings.mesh = replay.settings.mesh;
+  data::Recording finer = replay.recording.is_solid() ? with_halved_tets(replay.recording) : replay.recording;
+  if (!finer.is_solid()) halve_cells(finer);
+  return on_mesh(replay, std::move(finer), settings);
 }
 
 std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays) {
   std::vector<Replay> halves;
   for (const Replay& replay : replays) {
-    std::optional<Replay> half = on_half_the_cell(replay);
-    if (!half) return {};
-    halves.push_back(std::move(*half));
+    halves.push_back(on_half_the_cell(replay));
   }
   return halves;
 }

@@ -14,7 +14,7 @@ std::string scaled_cell(const std::string& specification, double factor);
 /// The same recording on cells of half the size, keyframes weighing as they do: meshed anew by its
 /// specification, or the tetrahedra of a file split. Empty for a sheet from a file, and in a shape of its
 /// own.
-std::optional<Replay> on_half_the_cell(const Replay& replay);
+Replay on_half_the_cell(const Replay& replay);
 
 /// Of all of them; empty where one has none.
 std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays);

@@ -94,7 +94,8 @@ class BytesReader {
   std::size_t place_ = 0;
 };
 
-std::string key_of(const Replay& replay, const sim::Environment& world, const std::vector<int>& kept) {
+std::string key_of(const Replay& replay, const ReplayCandidate& candidate, const std::vector<int>& kept) {
+  const sim::Environment world = make_environment(replay, candidate);
   Bytes bytes;
   bytes.add_text(std::string(kMagic));  // a file of another format has another name
   bytes.add_text(FLASH_VERSION);
@@ -144,6 +145,10 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
     for (const double value : {layers->thickness, layers->friction, layers->pressure}) bytes.add(value);
   for (const sim::RestTriangle& triangle : replay.sheet().triangles)
     if (triangle.stiff) bytes.add_matrix(triangle.vertices);
+  if (const auto& size = candidate.nuisance.grasp_size) {  // a mesh moved to it
+    bytes.add_text("grasp_size");
+    bytes.add(*size);
+  }
   bytes.add(replay.steps);  // a file has the force of each
   for (const int step : kept) bytes.add(step);
   return data::sha256(bytes.text());
@@ -215,7 +220,7 @@ void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& 
   const std::vector<int> kept = scored_steps(replay);
   std::vector<std::string> wanted(candidates.size());
   data::for_each_in_parallel(candidates.size(), replay.settings.threads, [&](std::size_t i) {
-    std::string key = key_of(replay, make_environment(replay, candidates[i]), kept);
+    std::string key = key_of(replay, candidates[i], kept);
     std::optional<ReplayResult> found;
     if (std::filesystem::exists(path_of(key))) found = load(replay, kept, key, path_of(key));
     if (found)
@@ -252,7 +257,7 @@ void MotionStore::prepare(const std::vector<WantedMotion>& wanted) const {
   std::map<const Replay*, std::vector<ReplayCandidate>> batches;
   for (const WantedMotion& motion : wanted) {
     const Replay& replay = *motion.replay;
-    const std::string key = key_of(replay, make_environment(replay, motion.candidate), scored_steps(replay));
+    const std::string key = key_of(replay, motion.candidate, scored_steps(replay));
     if (!std::filesystem::exists(path_of(key))) batches[motion.replay].push_back(motion.candidate);
   }
   if (batches.empty()) return;

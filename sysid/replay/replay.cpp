@@ -3,15 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numeric>
+#include <optional>
 
 #include "data/error.h"
 #include "data/scene.h"
 #include "data/text.h"
 #include "data/worst.h"
 #include "sim/device_batch.h"
+#include "sim/device_error.h"
 #include "sim/scene/solid.h"
+#include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/recorded_grasp.h"
+#include "sysid/replay/recorded_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -26,62 +31,6 @@ Eigen::Vector3d upward(const data::Recording& recording) {
 void turn(data::Points& points, const Eigen::Vector3d& pivot, const Eigen::Vector3d& up, double angle) {
   const Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, up).toRotationMatrix();
   points = ((points.rowwise() - pivot.transpose()) * rotation.transpose()).rowwise() + pivot.transpose();
-}
-
-/// The vertices of `mesh` inside the bounding box, at rest, of those that were taken on the recording's own.
-std::vector<int> same_place(const std::vector<int>& taken, const data::TriangleMesh& own,
-                            const data::TriangleMesh& mesh, const std::string& source,
-                            const std::string& field) {
-  Eigen::AlignedBox3d box;
-  for (const int vertex : taken) box.extend(own.vertices.row(vertex).transpose());
-  const double slack = 1e-6 * (own.vertices.colwise().maxCoeff() - own.vertices.colwise().minCoeff()).norm();
-  std::vector<int> vertices;
-  for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i)
-    if (box.exteriorDistance(Eigen::Vector3d(mesh.vertices.row(i))) <= slack)
-      vertices.push_back(static_cast<int>(i));
-  if (vertices.empty())
-    throw data::input_error(source, field + ".select.vertices", "none of the other mesh lies where these do");
-  return vertices;
-}
-
-/// Replaces the recording's mesh; the start follows its pose; grasps, supports and loads the place of their
-/// vertices.
-void replace_mesh(data::Recording& recording, const std::string& mesh) {
-  if (!recording.start_mesh.empty()) {
-    throw data::input_error(recording.source, "object.start",
-                            "is a mesh of its own, so that the sheet cannot be meshed anew as " + mesh);
-  }
-  const data::TriangleMesh own = std::move(recording.mesh);
-  const bool was_solid = recording.is_solid();
-  data::load_object_mesh(mesh, "mesh", "sheet", recording);
-  if (recording.is_solid() != was_solid)
-    throw data::InputError("--mesh: found " + mesh + ", expected " +
-                           (was_solid ? "a solid as box:0.1x0.03x0.03:0.01 or a file of tetrahedra"
-                                      : "a sheet as sheet:0.4x0.4:0.02 or a file of triangles"));
-  const auto size_of = [](const data::TriangleMesh& each) -> Eigen::Vector3d {
-    return (each.vertices.colwise().maxCoeff() - each.vertices.colwise().minCoeff()).transpose();
-  };
-  const Eigen::Vector3d was = size_of(own), is = size_of(recording.mesh);
-  constexpr double kOther =
-      0.25;  // of the largest side: cells of another size and a new measurement stay below
-  if ((was - is).cwiseAbs().maxCoeff() > kOther * was.maxCoeff()) {
-    const auto text = [](const Eigen::Vector3d& size) {
-      return data::format_short(size.x()) + " x " + data::format_short(size.y()) + " x " +
-             data::format_short(size.z()) + " m";
-    };
-    throw data::InputError("--mesh: found " + mesh + ", " + text(is) +
-                           ", expected about the size of the object in " + recording.source + ", " +
-                           text(was));
-  }
-  const auto moved = [&](data::Selection& select, const char* field) {
-    if (!select.vertices.empty())
-      select.vertices = same_place(select.vertices, own, recording.mesh, recording.source, field);
-  };
-  for (data::RecordedGrasp& grasp : recording.grasps) moved(grasp.select, "grasps");
-  for (data::RecordedSupport& support : recording.supports) moved(support.select, "supports");
-  for (data::RecordedLoad& load : recording.loads) moved(load.select, "loads");
-  recording.start = (recording.mesh.vertices * recording.base_from_object.linear().transpose()).rowwise() +
-                    recording.base_from_object.translation().transpose();
 }
 
 /// The plan of a solid, and of its vertices those that its outer faces have.
@@ -156,14 +105,14 @@ int steps_in(double duration, double step) {
 
 namespace {
 
-/// `observe`: adds what was observed, once the sheet is there.
-Replay assemble(const data::Recording& recording, const ReplaySettings& settings,
+/// `recording`: on the mesh that is simulated. `observe`: adds what was observed, once the sheet is there.
+Replay assemble(data::Recording recording_on_mesh, const ReplaySettings& settings, std::string object_mesh,
                 std::shared_ptr<const sim::SheetPlan> plan, const std::function<void(Replay&)>& observe) {
   Replay replay;
-  replay.recording = recording;
+  replay.recording = std::move(recording_on_mesh);
+  const data::Recording& recording = replay.recording;
   replay.settings = settings;
-  replay.object_mesh = recording.mesh_spec;
-  if (!settings.mesh.empty()) replace_mesh(replay.recording, settings.mesh);
+  replay.object_mesh = std::move(object_mesh);
   replay.up = upward(recording);
 
   replay.plan = std::move(plan);
@@ -211,7 +160,10 @@ Replay assemble(const data::Recording& recording, const ReplaySettings& settings
 
 Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan) {
-  return assemble(recording, settings, std::move(plan), [&](Replay& replay) {
+  data::Recording on_mesh = recording;
+  if (!settings.mesh.empty()) replace_mesh(settings.mesh, on_mesh);
+  grade_towards_grasps(settings, on_mesh);
+  return assemble(std::move(on_mesh), settings, recording.mesh_spec, std::move(plan), [&](Replay& replay) {
     for (const data::Keyframe& keyframe : data::load_keyframes(recording, replay.notices)) {
       Observation observation{.t = keyframe.time,
                               .points = keyframe.cloud,
@@ -233,9 +185,9 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   });
 }
 
-Replay make_replay(const Replay& replay, const ReplaySettings& settings,
-                   std::shared_ptr<const sim::SheetPlan> plan) {
-  return assemble(replay.recording, settings, std::move(plan), [&](Replay& made) {
+Replay on_mesh(const Replay& replay, data::Recording recording, const ReplaySettings& settings,
+               std::shared_ptr<const sim::SheetPlan> plan) {
+  return assemble(std::move(recording), settings, replay.object_mesh, std::move(plan), [&](Replay& made) {
     made.observations = replay.observations;
     for (Observation& observation : made.observations)
       for (Mark& mark : observation.marks) {
@@ -244,6 +196,16 @@ Replay make_replay(const Replay& replay, const ReplaySettings& settings,
         mark = put_mark(place, made.surface, made.queries->nearest(place));
       }
   });
+}
+
+Replay make_replay(const Replay& replay, const ReplaySettings& settings,
+                   std::shared_ptr<const sim::SheetPlan> plan) {
+  data::Recording recording = replay.recording;
+  if (settings.mesh != replay.settings.mesh) {
+    replace_mesh(settings.mesh.empty() ? replay.object_mesh : settings.mesh, recording);
+    grade_towards_grasps(settings, recording);
+  }
+  return on_mesh(replay, std::move(recording), settings, std::move(plan));
 }
 
 sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate) {
@@ -352,10 +314,9 @@ ReplayResult result_of(const Replay& replay, const std::vector<int>& kept, const
   return result;
 }
 
-}  // namespace
-
-void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, const std::vector<int>& kept,
-         const std::function<void(std::size_t, ReplayResult)>& finished) {
+/// Of candidates whose grasps are as large as the replay's.
+void run_alike(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
+               const std::vector<int>& kept, const std::function<void(std::size_t, ReplayResult)>& finished) {
   sim::BatchSettings settings;
   settings.solver = replay.settings.solver;
   settings.steps = replay.steps;
@@ -367,6 +328,36 @@ void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, c
       replay.plan, candidates.size(), replay.settings.envs, settings,
       [&](std::size_t i) { return make_environment(replay, candidates[i]); },
       [&](std::size_t i, const sim::Batch& batch, int e) { finished(i, result_of(replay, kept, batch, e)); });
+}
+
+}  // namespace
+
+Replay with_grasp_size(const Replay& replay, double size) {
+  data::Recording recording = replay.recording;
+  ReplaySettings settings = replay.settings;
+  resize_grasps(size, settings, recording);
+  return on_mesh(replay, std::move(recording), settings);
+}
+
+void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, const std::vector<int>& kept,
+         const std::function<void(std::size_t, ReplayResult)>& finished) {
+  std::map<std::optional<double>, std::vector<std::size_t>> of_size;
+  for (std::size_t i = 0; i < candidates.size(); ++i) of_size[candidates[i].nuisance.grasp_size].push_back(i);
+  for (const auto& [size, members] : of_size) {
+    std::vector<ReplayCandidate> alike;
+    for (const std::size_t i : members) alike.push_back(candidates[i]);
+    const auto finished_here = [&, &of = members](std::size_t k, ReplayResult result) {
+      finished(of[k], std::move(result));
+    };
+    try {
+      if (size)
+        run_alike(with_grasp_size(replay, *size), alike, kept, finished_here);
+      else
+        run_alike(replay, alike, kept, finished_here);
+    } catch (const sim::DeviceError& error) {
+      throw error.renumbered([&, &of = members](std::size_t k) { return of.at(k); });
+    }
+  }
 }
 
 std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates) {

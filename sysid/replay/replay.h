@@ -18,6 +18,9 @@ namespace flash::sysid {
 struct ReplaySettings {
   sim::SolverSettings solver;
   std::string mesh;  ///< mesh specification or file in place of the recording's; empty: the recording's
+  /// Edge length of the cells at each grasp [m]; absent: a fifth of those of the mesh or of the patch, where
+  /// the mesh names no pattern of its own; 0: the mesh as it is.
+  std::optional<double> grasp_cell;
   data::ElementOrder element_order = data::ElementOrder::linear;  ///< of a solid
   std::optional<double> pre_roll;  ///< simulated before the recording starts, gripper at its first pose;
                                    ///< absent: 0.4 where a grasp needs time to close, else 0 [s]
@@ -40,6 +43,7 @@ struct ReplaySettings {
 struct ReplayNuisance {
   double start_yaw = 0;     ///< turn of the sheet on the table about the gripper's first position [rad]
   double table_height = 0;  ///< of table and sheet, against the gripper's path [m]
+  std::optional<double> grasp_size;       ///< of patches at corners; absent: the recording's [m]
   std::optional<double> grasp_depth;      ///< pinch: size of the folded patch; absent: the recording's [m]
   std::optional<double> grasp_direction;  ///< pinch: angle of the ridge from the sheet's diagonal; absent:
                                           ///< the recording's [rad]
@@ -95,12 +99,21 @@ int steps_in(double duration, double step);
 Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan = nullptr);
 
-/// The recording of a replay under other settings. What was observed is taken over with its weights; no file
-/// is read but that of another mesh.
+/// A replay on another mesh of its object, that of `recording`. What was observed is taken over with its
+/// weights.
+Replay on_mesh(const Replay& replay, data::Recording recording, const ReplaySettings& settings,
+               std::shared_ptr<const sim::SheetPlan> plan = nullptr);
+
+/// The recording of a replay under other settings, on the same mesh unless settings.mesh changes. What was
+/// observed is taken over with its weights; no file is read but that of another mesh.
 Replay make_replay(const Replay& replay, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan = nullptr);
 
-/// The simulated world of one candidate, before its first step.
+/// A replay whose patches at corners are as large as `size` [m] (resize_grasps): the same triangles in
+/// another place.
+Replay with_grasp_size(const Replay& replay, double size);
+
+/// The simulated world of one candidate, before its first step; grasp_size is left to `run`.
 sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate);
 
 /// The steps that a score of the replay reads, ascending: the first, and those around each keyframe, as far
@@ -113,8 +126,9 @@ std::vector<int> every_step(const Replay& replay);
 /// What a device cannot do yet of one of the candidates, in a line; empty where it can simulate all.
 std::string why_not_on_device(const Replay& replay, const std::vector<ReplayCandidate>& candidates);
 
-/// Simulates the candidates, replay.settings.envs of them at once. Only positions at the steps `kept` are
-/// held; others are empty. The thread that simulated a candidate calls `finished` with its number and result.
+/// Simulates the candidates, replay.settings.envs of them at once, those of one grasp_size together. Only
+/// positions at the steps `kept` are held; others are empty. The thread that simulated a candidate calls
+/// `finished` with its number and result.
 void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, const std::vector<int>& kept,
          const std::function<void(std::size_t, ReplayResult)>& finished);
 

@@ -133,13 +133,12 @@ std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) 
   std::vector<std::string> warnings;
   for (const Replay& replay : replays) {
     if (replay.recording.is_solid()) continue;
-    const std::optional<Replay> finer = on_half_the_cell(replay);
-    if (!finer) continue;
+    const Replay finer = on_half_the_cell(replay);
     const Eigen::RowVector3d sides = replay.recording.mesh.vertices.colwise().maxCoeff() -
                                      replay.recording.mesh.vertices.colwise().minCoeff();
     for (std::size_t g = 0; g < replay.recording.grasps.size(); ++g) {
       const double here = held_extent(replay, replay.recording.grasps[g]),
-                   there = held_extent(*finer, finer->recording.grasps[g]);
+                   there = held_extent(finer, finer.recording.grasps[g]);
       if (std::abs(here - there) > kSame * sides.head<2>().minCoeff())
         warnings.push_back(replay.recording.name + ": the gripper holds " + mm(here) +
                            " of the sheet on the mesh of the search, and " + mm(there) +

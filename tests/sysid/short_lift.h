@@ -18,7 +18,7 @@ inline data::SheetMaterial short_lift_material() {
 
 /// A strip lifted by its end within 0.4 s, recorded and loaded back from its files.
 inline Replay short_lift(const data::TemporaryFolder& folder,
-                         const std::string& mesh = "sheet:0.2x0.05:0.025",
+                         const std::string& mesh = "sheet:0.2x0.05:0.025:alternating",
                          const data::SheetMaterial& material = short_lift_material(), unsigned seed = 1) {
   SynthSettings settings;
   settings.name = "lift";

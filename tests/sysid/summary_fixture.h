@@ -50,7 +50,7 @@ inline Summary example_summary() {
   recording.frames = {{1.0, 0.003, 1}, {1.5, 0.005, 1}, {2.0, 0.02, 0}};
   summary.recordings = {recording};
   summary.solver_check = {{"half_step", 1e-4}, {"double_mesh", 2e-4}};
-  summary.settings = {{"mesh", "sheet:0.4x0.4:0.02"}, {"thickness_m", "0.001"}};
+  summary.settings = {{"mesh", "sheet:0.4x0.4:0.02:alternating"}, {"thickness_m", "0.001"}};
   summary.asset = "towel.json";
   summary.candidates = 9;
   summary.wall_seconds = 12;

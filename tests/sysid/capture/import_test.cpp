@@ -38,7 +38,7 @@ class ImportFiles : public testing::Test {
     folder_.write("clouds/notes.txt", "not a cloud");
     settings_.clouds = clouds();
     load_gripper();
-    set_sheet("sheet:0.2x0.2:0.02", settings_);
+    set_sheet("sheet:0.2x0.2:0.02:alternating", settings_);
     settings_.grasp.within = 0.024;
     settings_.crop.min.z() = 0.055;
     settings_.table_height = 0.05;
@@ -303,7 +303,7 @@ TEST_P(ImportedClip, StartsNearTheRecordingMadeByHand) {
   settings.trajectory_path = by_hand.trajectory_paths.at("gripper");
   settings.trajectory = data::load_trajectory(settings.trajectory_path);
   const bool twin = std::string(GetParam()).starts_with("twin");
-  set_sheet(twin ? "sheet:0.4x0.4:0.01" : "sheet:0.278x0.278:0.01", settings);
+  set_sheet(twin ? "sheet:0.4x0.4:0.01:alternating" : "sheet:0.278x0.278:0.01:alternating", settings);
   if (twin) {
     settings.grasp.corner = {1, 1};
   } else {

@@ -15,7 +15,7 @@
 namespace flash::sysid {
 namespace {
 
-constexpr const char* mesh_spec = "sheet:0.3x0.3:0.05";
+constexpr const char* mesh_spec = "sheet:0.3x0.3:0.05:alternating";
 
 data::SheetMaterial stiff_towel() {
   data::SheetMaterial material;

@@ -37,7 +37,7 @@ TEST(Plan, TheRangeAloneIsAUniformDistribution) {
 TEST(Plan, AFlatSheetSaysNothingOfItsBending) {
   const PlanSettings settings = bending_unknown();
   data::Recording sheet;
-  sheet.mesh_spec = "sheet:0.2x0.2:0.05";
+  sheet.mesh_spec = "sheet:0.2x0.2:0.05:alternating";
   sheet.mesh = data::parse_mesh_spec(sheet.mesh_spec);
   const double before = spread_of_ranges(settings.grid.axes).front();
   const auto after = [&](const char* kind) {

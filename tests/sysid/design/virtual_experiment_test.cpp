@@ -20,7 +20,7 @@ data::SheetMaterial towel() {
 /// A recording whose rest sheet lies anywhere.
 data::Recording some_recording() {
   data::Recording recording;
-  recording.mesh_spec = "sheet:0.2x0.2:0.05";
+  recording.mesh_spec = "sheet:0.2x0.2:0.05:alternating";
   recording.mesh = data::parse_mesh_spec(recording.mesh_spec);
   recording.mesh.vertices.rowwise() += Eigen::RowVector3d(-0.1, -0.1, 0);
   return recording;

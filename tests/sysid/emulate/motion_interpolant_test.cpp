@@ -39,7 +39,7 @@ TEST(MotionInterpolant, IsExactForMotionsCubicInTheCoordinates) {
 
 struct Lift {
   data::TemporaryFolder folder;
-  Replay replay = short_lift(folder, "sheet:0.2x0.05:0.0125");
+  Replay replay = short_lift(folder, "sheet:0.2x0.05:0.0125:alternating");
   GridSettings grid;
   Lift() {
     grid.base.material = short_lift_material();

@@ -110,7 +110,7 @@ TEST(Lattice, OneFarWiderThanTheAnswerNeedsIsSimulatedAgain) {
 // are few.
 TEST(Lattice, MotionsBetweenItsPointsAreThoseSimulated) {
   const data::TemporaryFolder folder;
-  const Replay replay = short_lift(folder, "sheet:0.2x0.05:0.0125");
+  const Replay replay = short_lift(folder, "sheet:0.2x0.05:0.0125:alternating");
   GridSettings grid;
   grid.base.material = short_lift_material();
   grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log"), parse_axis("friction", "0.15:0.6:3:log")};

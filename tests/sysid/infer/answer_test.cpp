@@ -28,7 +28,7 @@ TEST(Answer, IsTheSameOnAnyThreads) {
   GridSettings grid = bending_grid();
   grid.axes.push_back(parse_axis("friction", "0.1:0.6:4"));
   grid.rollouts = folder / "rollouts";
-  std::vector<Replay> replays = {short_lift(folder, "sheet:0.2x0.05:0.0125")};
+  std::vector<Replay> replays = {short_lift(folder, "sheet:0.2x0.05:0.0125:alternating")};
   ResultsStore store(folder / "run", grid.axes, {"lift"}, {}, Existing::refuse);
   ASSERT_TRUE(grid_search(replays, grid, store));
   AnswerSettings asked = without_horizon();
@@ -49,7 +49,7 @@ TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   const data::TemporaryFolder folder;
   std::vector<Replay> replays = {short_lift(folder, "sheet:0.2x0.05:0.0041666667:alternating_by_row")};
   ReplaySettings settings = replays[0].settings;
-  settings.mesh = "sheet:0.2x0.05:0.0125";
+  settings.mesh = "sheet:0.2x0.05:0.0125:alternating";
   replays[0] = make_replay(replays[0].recording, settings);
   GridSettings grid = bending_grid();
   grid.rollouts = folder / "rollouts";
@@ -90,7 +90,7 @@ Answer answer_of_two(double first, double second) {
     data::SheetMaterial material = short_lift_material();
     material.bending_rigidity = bending;
     const auto r = static_cast<unsigned>(replays.size());
-    replays.push_back(short_lift(folders[r], "sheet:0.2x0.05:0.0125", material, r + 1));
+    replays.push_back(short_lift(folders[r], "sheet:0.2x0.05:0.0125:alternating", material, r + 1));
   }
   GridSettings grid = bending_grid();
   grid.rollouts = folders[2] / "rollouts";

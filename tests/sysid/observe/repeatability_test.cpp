@@ -39,7 +39,7 @@ data::Recording trial(const data::TemporaryFolder& folder, unsigned seed, double
   data::SheetMaterial material;
   material.membrane_stiffness = 30;
   material.bending_rigidity = bending;
-  const std::string spec = "sheet:0.3x0.3:0.05";
+  const std::string spec = "sheet:0.3x0.3:0.05:alternating";
   SynthRecording made = synthesize(data::parse_mesh_spec(spec), spec, material, settings, {});
   save_synthetic(made, folder / settings.name);
   return data::load_recording(folder / settings.name);

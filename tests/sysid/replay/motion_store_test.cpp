@@ -17,7 +17,7 @@
 namespace flash::sysid {
 namespace {
 
-constexpr const char* kMesh = "sheet:0.3x0.3:0.05";
+constexpr const char* kMesh = "sheet:0.3x0.3:0.05:alternating";
 
 data::SheetMaterial towel() {
   data::SheetMaterial material;

@@ -28,7 +28,7 @@ class Lift : public ::testing::Test {
     path = std::string(FLASH_SHARED_DIR) + "/data/twin/lift_a";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no recording at " << path;
     recording = data::load_recording(path);
-    settings.mesh = "sheet:0.4x0.4:0.04";
+    settings.mesh = "sheet:0.4x0.4:0.04:alternating";
     settings.grasp_within = 0.041;
   }
   std::string path;
@@ -206,7 +206,7 @@ TEST(Replay, AGraspInTwoPartsPullsAsOne) {
 /// The strip of short_lift hung up by one end, while the other end is carried over and through it.
 Replay carried_through(const data::TemporaryFolder& folder,
                        const std::optional<sim::SelfContact>& self_contact) {
-  const Replay lift = short_lift(folder, "sheet:0.2x0.05:0.0125");
+  const Replay lift = short_lift(folder, "sheet:0.2x0.05:0.0125:alternating");
   data::Recording recording = lift.recording;
   data::Trajectory& path = recording.trajectories.at(recording.grasps[0].gripper);
   const Eigen::Isometry3d start = path.poses.front();
@@ -370,9 +370,9 @@ TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {
 // Files are not read again: they may be gone.
 TEST(Replay, UnderOtherSettingsIsThatOfItsFilesWithoutThem) {
   const data::TemporaryFolder folder;
-  Replay replay = short_lift(folder, "sheet:0.2x0.05:0.025");
+  Replay replay = short_lift(folder, "sheet:0.2x0.05:0.025:alternating");
   ReplaySettings settings = replay.settings;
-  settings.mesh = "sheet:0.2x0.05:0.0125";
+  settings.mesh = "sheet:0.2x0.05:0.0125:alternating";
   settings.solver.time_step *= 0.5;
   const Replay read = make_replay(data::load_recording(folder / "lift"), settings);
   replay.observations[3].weight = 0.5;

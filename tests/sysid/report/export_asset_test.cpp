@@ -12,7 +12,7 @@ namespace {
 
 data::Asset towel() {
   data::Asset asset;
-  asset.mesh = "sheet:0.4x0.4:0.02";
+  asset.mesh = "sheet:0.4x0.4:0.02:alternating";
   asset.young = 1e5;
   asset.thickness = 0.001;
   asset.bending_rigidity = 5e-5;
@@ -106,14 +106,14 @@ TEST(ExportAsset, AValueThatIsKeptKeepsItsSource) {
 // The asset file's sheet is only where the search began.
 TEST(ExportAsset, IsOfTheSheetThatWasIdentified) {
   Summary summary = example_summary();
-  summary.settings["object_mesh"] = "sheet:0.30x0.24:0.01";
+  summary.settings["object_mesh"] = "sheet:0.30x0.24:0.01:alternating";
   summary.parameters.front().name = "areal_density";  // not identifiable: the mass of the asset by this area
   summary.parameters.front().values = {0.1, 0.2, 0.3};
   data::Asset asset = towel();
   asset.areal_density.reset();
   asset.mass = 0.018;
   const data::Asset tuned = tuned_asset(asset, summary);
-  EXPECT_EQ(tuned.mesh, "sheet:0.30x0.24:0.01");
+  EXPECT_EQ(tuned.mesh, "sheet:0.30x0.24:0.01:alternating");
   EXPECT_NEAR(*tuned.areal_density, 0.018 / (0.30 * 0.24), 1e-12);
   std::vector<std::string> notices;
   const data::Asset published = data::express_as(tuned, data::AssetFormat::published, 0.30 * 0.24, notices);

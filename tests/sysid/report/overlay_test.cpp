@@ -11,7 +11,7 @@ namespace {
 
 TEST(Overlay, ComesBackFromItsFolder) {
   const data::TemporaryFolder folder;
-  const data::TriangleMesh mesh = data::parse_mesh_spec("sheet:0.1x0.1:0.05");
+  const data::TriangleMesh mesh = data::parse_mesh_spec("sheet:0.1x0.1:0.05:alternating");
   Overlay overlay{"lift", mesh.triangles, {}};
   overlay.frames = {{0.5, mesh.vertices, data::Points::Constant(4, 3, 0.25), 0.002},
                     {0.7, mesh.vertices, data::Points(0, 3), 0}};
@@ -39,7 +39,7 @@ bool is_blue(const data::Colour& c) { return c[2] > 120 && c[0] < 100; }
 
 // An upright square of 0.2 m facing the side view: a filled square there, a thin line from the front.
 TEST(OverlayImage, DrawsSurfaceAndCloudToScale) {
-  data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
+  data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1:alternating");
   square.vertices.col(2) = square.vertices.col(1).eval();
   square.vertices.col(1).setZero();
   data::Points cloud(1, 3);
@@ -61,7 +61,7 @@ TEST(OverlayImage, DrawsSurfaceAndCloudToScale) {
 
 // Along the fold of a sheet that lies on itself the normals of its two halves cancel.
 TEST(OverlayImage, AFoldedSheetIsLitToo) {
-  data::TriangleMesh folded = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
+  data::TriangleMesh folded = data::parse_mesh_spec("sheet:0.2x0.2:0.1:alternating");
   folded.vertices.col(2) = folded.vertices.col(1).eval();
   folded.vertices.col(1).setZero();
   folded.vertices.col(0) = (folded.vertices.col(0).array() - 0.1).abs().eval();
@@ -77,7 +77,7 @@ TEST(OverlayImage, AFoldedSheetIsLitToo) {
 
 // Two frames, a square that faces the side view, then one that faces the front.
 TEST(OverlayImage, ASequenceHasAColumnAFrameAndTheSideViewAbove) {
-  data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
+  data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1:alternating");
   const data::Points flat = square.vertices;
   Overlay overlay{"lift", square.triangles, {}};
   for (const int across : {1, 0}) {
@@ -108,7 +108,7 @@ TEST(OverlayImage, ASequenceHasAColumnAFrameAndTheSideViewAbove) {
 }
 
 TEST(OverlayImage, PointsBehindTheSurfaceArePale) {
-  data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
+  data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1:alternating");
   square.vertices.col(2) = square.vertices.col(1).eval();
   square.vertices.col(1).setZero();
   data::Points cloud(1, 3);

@@ -39,7 +39,7 @@ TEST(SettingsTexts, OfTheSearchBehindAnAssetWhatDiffersIsNamed) {
   auto other = searched;
   other["mesh"] = "sheet:1x1:0.5 (9 vertices)";
   EXPECT_EQ(unlike_the_search(asset, other, {yaw, height}).size(), 1u);
-  other["object_mesh"] = "sheet:1x1:0.1";
+  other["object_mesh"] = "sheet:1x1:0.1:alternating";
   EXPECT_EQ(unlike_the_search(asset, other, {yaw, height}), Lines{});
 }
 

@@ -91,12 +91,12 @@ TEST(Summarize, SaysThatCellsDoNotDivideTheGraspedPatch) {
       all += warning + "\n";
     return all;
   };
-  EXPECT_EQ(warned("sheet:0.2x0.05:0.025"), "");
-  EXPECT_NE(warned("sheet:0.2x0.05:0.03333333")
+  EXPECT_EQ(warned("sheet:0.2x0.05:0.025:alternating"), "");
+  EXPECT_NE(warned("sheet:0.2x0.05:0.03333333:alternating")
                 .find("lift: the gripper holds 60.09 mm of the sheet on the mesh of the search, and 70.71 mm "
                       "on half its cells"),
             std::string::npos)
-      << warned("sheet:0.2x0.05:0.03333333");
+      << warned("sheet:0.2x0.05:0.03333333:alternating");
 }
 
 TEST(Summarize, RecordingsThatContradictEachOtherCannotBeUsed) {
