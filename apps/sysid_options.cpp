@@ -227,7 +227,7 @@ sysid::ScoreSettings score_settings(const ReplayOptions& options) {
 void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values) {
   CLI::App& group = *verb.add_option_group("Searched parameters",
                                            "low:high:count[:log] or a list a,b,c; --hold takes one value");
-  for (const sysid::ParameterInfo& info : sysid::known_parameters()) {
+  for (const sysid::Parameter& info : sysid::known_parameters()) {
     const std::string unit = info.unit.empty() ? "" : " [" + info.unit + "]";
     group
         .add_option_function<std::string>(

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string_view>
 #include <system_error>
 
 #include "data/atomic_file.h"
@@ -14,10 +15,14 @@
 #include "data/sha256.h"
 #include "data/text.h"
 
+namespace flash::source_digest {
+
+std::string_view detections();  // of the finders
+
+}  // namespace flash::source_digest
+
 namespace flash::calib {
 namespace {
-
-constexpr int kFinderVersion = 5;  // counts changes of what the finders return
 
 /// Points of the target, each once, at places in or near a picture.
 bool is_sound(const Sighting& sighting, int points) {
@@ -75,7 +80,7 @@ DetectionCache::DetectionCache(std::string folder, const std::optional<data::Cam
       tell_(std::move(tell)) {
   if (folder_.empty()) return;
   const auto add = [&](double value) { key_ += data::format_number(value) + ' '; };
-  key_ = std::string(FLASH_VERSION) + ' ' + std::to_string(kFinderVersion) + ' ' + target.dictionary + ' ';
+  key_ = std::string(source_digest::detections()) + ' ' + target.dictionary + ' ';
   // Corners are the same whatever the size: only the shape counts.
   const double size = target.spacing > 0 ? target.spacing : target.marker_size;
   for (const double value :

@@ -10,7 +10,7 @@
 namespace flash::calib {
 
 /// Keeps what finders found in a folder, a JSON file for each picture, named by a hash of the picture's
-/// bytes, the target, the intrinsics and the version of this program: nothing stale is ever read. Safe
+/// bytes, the target, the intrinsics and the sources of the finders: nothing stale is ever read. Safe
 /// between threads and between programs.
 class DetectionCache {
  public:

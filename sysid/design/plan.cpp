@@ -77,7 +77,7 @@ struct Asked {
 /// `at`: of every axis. `scales`: an error of the weight is the same factor of every stiffness.
 Asked with_held(const PlanSettings& settings, const std::vector<double>& at,
                 const std::vector<Replay>& replays, bool scales) {
-  std::vector<HeldParameter> all = held_parameters(settings.grid, replays);
+  std::vector<HeldParameter> all = held_parameters(settings.grid, replays, at);
   if (scales) std::erase_if(all, [](const HeldParameter& held) { return held.name.ends_with("density"); });
   const auto is_held = [&](const Axis& axis) {
     return std::any_of(all.begin(), all.end(), [&](const auto& held) { return held.name == axis.name; });

@@ -7,19 +7,7 @@ namespace flash::sysid {
 namespace {
 
 double own_value(const MaterialBase& base, const std::string& name) {
-  const data::SheetMaterial& m = base.material;
-  if (name == "young") return m.membrane_stiffness / base.thickness.value_or(1.0);
-  if (name == "poisson") return m.poissons_ratio;
-  if (name == "bending") return make_candidate(base, {}, {}).material.bending_rigidity;
-  if (name == "bending_ratio") return m.weave.bending_ratio;
-  if (name == "young_ratio") return m.weave.young_ratio;
-  if (name == "shear_ratio") return m.weave.shear_ratio;
-  if (name == "yield_curvature") return m.yield_curvature;
-  if (name == "friction") return m.friction;
-  if (name == "areal_density") return m.areal_density;
-  if (name == "air_drag") return m.air_drag;
-  if (name == "stiffness_damping") return m.stiffness_damping;
-  return 0;
+  return parameter_named(name).get(make_candidate(base, {}, {}), base);
 }
 
 }  // namespace

@@ -5,10 +5,18 @@
 #include <cstdint>
 #include <cstdio>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "data/asset.h"
 #include "data/text.h"
+
+namespace flash::source_digest {
+
+std::string_view motions();
+std::string_view scores();
+
+}  // namespace flash::source_digest
 
 namespace flash::sysid {
 namespace {
@@ -217,7 +225,10 @@ void add_score(const ScoreSettings& score, Fingerprint& print) {
 
 Fingerprint fingerprint(const std::vector<Replay>& replays, const GridSettings& settings) {
   Fingerprint print;
-  print["program"] = FLASH_VERSION;
+  constexpr std::size_t kShort = 12;  // digits, for people
+  print["program"] = std::string(FLASH_VERSION) + ", sources " +
+                     std::string(source_digest::motions().substr(0, kShort)) + " " +
+                     std::string(source_digest::scores().substr(0, kShort));
   for (const Replay& replay : replays) add_replay(replay, print);
   add_material(settings.base, print);
   std::string order;

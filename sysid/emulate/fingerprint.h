@@ -8,8 +8,9 @@
 namespace flash::sysid {
 
 /// What decides the results of a search, under the names of files and options: numbers and words as they are
-/// ("time_step_s" "0.01", "axis bending" "1e-05 0.0001"), data as a hash ("recording lift_a keyframes"). What
-/// decides only how fast they come (threads, envs) is left out.
+/// ("time_step_s" "0.01", "axis bending" "1e-05 0.0001"), data as a hash ("recording lift_a keyframes"), the
+/// program as its version and a hash of its sources. What decides only how fast they come (threads, envs) is
+/// left out.
 Fingerprint fingerprint(const std::vector<Replay>& replays, const GridSettings& settings);
 
 /// "" where equal, else one phrase: "time_step_s was 0.01 and is 0.005, and 2 more".

@@ -13,15 +13,10 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kTiny = std::numeric_limits<double>::min();
-
-const ParameterInfo& info_of(const std::string& option, const std::string& name) {
-  const std::vector<ParameterInfo>& known = known_parameters();
-  const auto found = std::find_if(known.begin(), known.end(), [&](const auto& p) { return p.name == name; });
-  if (found != known.end()) return *found;
+const Parameter& info_of(const std::string& option, const std::string& name) {
+  if (const Parameter* const found = find_parameter(name)) return *found;
   std::vector<std::string> names;
-  for (const ParameterInfo& info : known) names.push_back(info.name);
+  for (const Parameter& info : known_parameters()) names.push_back(info.name);
   const std::string nearest = data::nearest_name(name, names);
   std::string all;
   for (const std::string& other : names) all += (all.empty() ? "" : ", ") + other;
@@ -39,7 +34,7 @@ double number(const std::string& option, std::string_view word) {
   return *value;
 }
 
-void check_range(const std::string& option, const ParameterInfo& info, double value) {
+void check_range(const std::string& option, const Parameter& info, double value) {
   if (value >= info.low && value <= info.high) return;
   throw data::InputError(option + ": found " + data::format_short(value) + ", expected " +
                          data::format_short(info.low) + " to " + data::format_short(info.high) +
@@ -47,30 +42,6 @@ void check_range(const std::string& option, const ParameterInfo& info, double va
 }
 
 }  // namespace
-
-const std::vector<ParameterInfo>& known_parameters() {
-  static const std::vector<ParameterInfo> parameters = {
-      {"young", "Pa or N/m", true, kTiny, 1e13,
-       "Young's modulus, or E t where the asset of a sheet has no thickness"},
-      {"poisson", "", true, -0.99, 0.5, "Poisson's ratio"},
-      {"bending", "N m", true, 0, 1e6, "flexural rigidity D"},
-      {"bending_ratio", "", true, 0.01, 100, "woven: D across the warp over D along it"},
-      {"young_ratio", "", true, 0.01, 100, "woven: E across the warp over E along it"},
-      {"shear_ratio", "", true, 1e-3, 100, "woven: G over that of an isotropic sheet"},
-      {"yield_curvature", "1/m", true, 1e-3, 1e6, "curvature at which bending begins to yield"},
-      {"friction", "", true, 0, 1e3, "Coulomb coefficient against the table"},
-      {"areal_density", "kg/m^2", true, 1e-9, 1e4, "mass per area"},
-      {"density", "kg/m^3", true, 1e-6, 1e6, "solid: mass per volume"},
-      {"air_drag", "1/s", true, 0, 1e4, "mass-proportional damping"},
-      {"stiffness_damping", "s", true, 0, 1e3, "stiffness-proportional damping"},
-      {"start_yaw", "rad", false, -kPi, kPi, "turn of the sheet on the table about the gripper"},
-      {"table_height", "m", false, -0.5, 0.5, "of table and sheet against the gripper's path"},
-      {"grasp_depth", "m", false, kTiny, 0.5, "pinch: size of the folded patch"},
-      {"grasp_direction", "rad", false, -kPi, kPi, "pinch: angle of the ridge from the sheet's diagonal"},
-      {"grasp_pitch", "rad", false, -kPi, kPi, "pinch: tilt of the ridge"},
-  };
-  return parameters;
-}
 
 std::string option_of(const std::string& name) {
   std::string option = "--" + name;
@@ -82,7 +53,7 @@ void check_parameter(const std::string& option, const std::string& name) { info_
 
 Axis parse_axis(const std::string& name, const std::string& specification) {
   const std::string option = option_of(name);
-  const ParameterInfo& info = info_of(option, name);
+  const Parameter& info = info_of(option, name);
   Axis axis{name, {}, false};
   if (specification.find(':') == std::string::npos) {
     for (const std::string_view word : data::split(specification, ","))
@@ -131,7 +102,7 @@ Hold parse_hold(const std::string& text) {
                            "\": expected name=value or name=value:measured, as friction=0.3");
   const std::string name = text.substr(0, equals);
   const std::string where = "--hold " + name;
-  const ParameterInfo& info = info_of(where, name);
+  const Parameter& info = info_of(where, name);
   std::string_view word = std::string_view(text).substr(equals + 1);
   const bool measured = word.ends_with(kMeasured);
   if (measured) word.remove_suffix(kMeasured.size());
@@ -186,16 +157,16 @@ namespace {
 /// Refuses what a solid does not have, or a sheet.
 void check_kind(const Axis& axis, const MaterialBase& base) {
   const std::string& name = axis.name;
+  const Parameter::Of of = info_of(option_of(name), name).of;
   if (!base.solid) {
-    if (name == "density")
-      throw data::InputError("--density: found a sheet, expected a solid; a sheet has --areal-density");
+    if (of == Parameter::Of::solid)
+      throw data::InputError(option_of(name) +
+                             ": found a sheet, expected a solid; a sheet has --areal-density");
     return;
   }
-  for (const char* own : {"bending", "bending_ratio", "young_ratio", "shear_ratio", "yield_curvature",
-                          "areal_density", "start_yaw", "table_height"})
-    if (name == own)
-      throw data::InputError(option_of(name) + ": found a solid, expected a sheet" +
-                             (name == "areal_density" ? "; a solid has --density" : ""));
+  if (of == Parameter::Of::sheet)
+    throw data::InputError(option_of(name) + ": found a solid, expected a sheet" +
+                           (name == "areal_density" ? "; a solid has --density" : ""));
   if (name == "poisson" && axis.values.back() >= 0.5)
     throw data::InputError("--poisson: found " + data::format_short(axis.values.back()) +
                            ", expected below 0.5 for a solid");
@@ -255,55 +226,17 @@ void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& 
                              "--grasp-shape pinch, or leave it out");
 }
 
-namespace {
-
-void set_values(const std::vector<Axis>& axes, const std::vector<double>& values,
-                data::SolidMaterial& material) {
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    const std::string& name = axes[i].name;
-    if (name == "young") material.youngs_modulus = values[i];
-    if (name == "poisson") material.poissons_ratio = values[i];
-    if (name == "density") material.density = values[i];
-    if (name == "friction") material.friction = values[i];
-    if (name == "air_drag") material.air_drag = values[i];
-    if (name == "stiffness_damping") material.stiffness_damping = values[i];
-  }
-}
-
-}  // namespace
-
 ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,
                                const std::vector<double>& values) {
   ReplayCandidate candidate{base.material, {}, base.solid};
-  if (candidate.solid) set_values(axes, values, *candidate.solid);
-  data::SheetMaterial& material = candidate.material;
-  const double thickness = base.thickness.value_or(1.0);
   bool bending_given = !base.bending_from_thickness;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    const std::string& name = axes[i].name;
-    const double value = values[i];
-    if (name == "young") material.membrane_stiffness = value * thickness;
-    if (name == "poisson") material.poissons_ratio = value;
-    if (name == "bending") {
-      material.bending_rigidity = value;
-      bending_given = true;
-    }
-    if (name == "bending_ratio") material.weave.bending_ratio = value;
-    if (name == "young_ratio") material.weave.young_ratio = value;
-    if (name == "shear_ratio") material.weave.shear_ratio = value;
-    if (name == "yield_curvature") material.yield_curvature = value;
-    if (name == "friction") material.friction = value;
-    if (name == "areal_density") material.areal_density = value;
-    if (name == "air_drag") material.air_drag = value;
-    if (name == "stiffness_damping") material.stiffness_damping = value;
-    if (name == "start_yaw") candidate.nuisance.start_yaw = value;
-    if (name == "table_height") candidate.nuisance.table_height = value;
-    if (name == "grasp_depth") candidate.nuisance.grasp_depth = value;
-    if (name == "grasp_direction") candidate.nuisance.grasp_direction = value;
-    if (name == "grasp_pitch") candidate.nuisance.grasp_pitch = value;
+    info_of(option_of(axes[i].name), axes[i].name).set(candidate, values[i], base);
+    bending_given = bending_given || axes[i].name == "bending";
   }
   if (!bending_given) {
-    const double nu = material.poissons_ratio;
+    data::SheetMaterial& material = candidate.material;
+    const double nu = material.poissons_ratio, thickness = base.thickness.value_or(1.0);
     material.bending_rigidity = material.membrane_stiffness * thickness * thickness / (12 * (1 - nu * nu));
   }
   return candidate;

@@ -3,8 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "data/material.h"
-#include "sysid/replay/replay.h"
+#include "sysid/emulate/parameter.h"
 
 namespace flash::sysid {
 
@@ -14,20 +13,6 @@ struct Axis {
   std::vector<double> values;  ///< increasing
   bool logarithmic = false;
 };
-
-/// A parameter that can be searched or fixed.
-struct ParameterInfo {
-  std::string name;
-  std::string unit;
-  bool material;     ///< belongs to the asset; otherwise it describes the recording (nuisance)
-  double low, high;  ///< values outside are refused
-  std::string meaning;
-};
-
-/// young, poisson, bending, bending_ratio, young_ratio, shear_ratio, yield_curvature, friction,
-/// areal_density, density, air_drag, stiffness_damping; start_yaw, table_height, grasp_depth,
-/// grasp_direction, grasp_pitch.
-const std::vector<ParameterInfo>& known_parameters();
 
 /// How the command line calls a parameter: "--start-yaw" for start_yaw.
 std::string option_of(const std::string& name);
@@ -60,15 +45,6 @@ std::vector<double> values_of(const std::vector<Axis>& axes, int id);
 
 /// How many cartesian_product makes.
 double count_candidates(const std::vector<Axis>& axes);
-
-/// What candidates are built on: the asset's material and how `young` and `bending` are understood.
-struct MaterialBase {
-  data::SheetMaterial material;
-  std::optional<double> thickness;  ///< given: young is E [Pa]; absent: young is E t [N/m]
-  bool bending_from_thickness =
-      false;  ///< D = E t^3 / (12 (1 - nu^2)) follows young unless bending is an axis
-  std::optional<data::SolidMaterial> solid = {};  ///< of a solid, in place of all that; young is E [Pa]
-};
 
 /// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
 /// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; bending_ratio under a bending model that

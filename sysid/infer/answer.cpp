@@ -112,8 +112,8 @@ std::vector<Alone> alone_over_all(const Task& task, const Found& found, const Gr
                                  *found.estimate.errors.front().terms[1].motions));
   if (reaches_beyond(extent_of(task.ranges), axes)) {
     // A search that went on from another has its motions about one answer alone.
-    const std::vector<Axis> wide = lattice(extent_of(task.ranges), task.ranges, 3, few_motions);
-    if (cartesian_product(wide).size() <= many_motions)
+    const std::vector<Axis> wide = lattice(extent_of(task.ranges), task.ranges, 3, few_motions(task.ranges));
+    if (cartesian_product(wide).size() <= many_motions(task.ranges))
       if (const std::optional<Emulator> emulator = emulator_over(task, wide, {}, true))
         return likeliest_alone(task, *emulator, wide, at, errors);
   }
@@ -127,7 +127,7 @@ Agreement agreement_about(const Task& task, const Found& found, const Answer& an
   if (found.emulator.share != own_mesh)
     errors.push_back(
         to_no_cells(Motions{task.replays, answer.motions}, Motions{answer.fit.replays, answer.fit.motions}));
-  refine_alone(task, alone, errors, few_motions);
+  refine_alone(task, alone, errors, few_motions(task.ranges));
   return agreement_of(task, alone, answer.values, errors);
 }
 
@@ -177,6 +177,7 @@ std::optional<Concluded> conclude_on_own_mesh(const Task& task, const Found& abo
 Concluded conclude(const Task& task, Found found, const std::vector<double>& best,
                    std::vector<KnownError>& held, const std::vector<Alone>& alone) {
   Found about = simulate_about(task, found, held);
+  const std::string unrefined = about.unrefined;
   const Settled settled = settle(task, about, best, held);
   if (settled == Settled::on_own_mesh)
     if (std::optional<Concluded> own = conclude_on_own_mesh(task, about, best, held, alone))
@@ -187,6 +188,7 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
     keep_to_simulated(task, found, best, held);
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
+  if (!unrefined.empty()) answer.warnings.push_back(unrefined);
   if (settled != Settled::by_emulator)
     answer.warnings.emplace_back(
         "the motion changes too abruptly between the values searched: the answer is by these alone; search "
@@ -205,7 +207,7 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
 
 AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
   const std::size_t motions =
-      lattice_rounds * (2 * few_motions + motions_at_estimate) + most_held_motions(grid);
+      lattice_rounds * (2 * few_motions(grid.axes) + motions_at_estimate) + most_held_motions(grid);
   return {static_cast<int>(recordings * motions), 2 * lattice_rounds * most_scores(grid.axes)};
 }
 
@@ -228,13 +230,13 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
     if (next == extent) break;
     extent = next;
   }
-  return lattice(extent, grid.axes, 3, few_motions);
+  return lattice(extent, grid.axes, 3, few_motions(grid.axes));
 }
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
   std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) +
-                        most_motions_alone(recordings, 2 * many_motions) +
+                        most_motions_alone(recordings, 2 * many_motions(grid.axes)) +
                         lattice_rounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
   const int alone = recordings > 1 ? 2 * static_cast<int>(recordings) : 0,
@@ -312,7 +314,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         millimetres(answer.estimate.score) +
         " on the same mesh: errors of the cells, of the step and of what is held decide "
         "between them; search on a finer mesh, with a shorter step, or what is held too");
-  warn_of_held(task, there.look.likelihood, there.errors, answer.warnings);
+  warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
 
   Posterior posterior = there.look.posterior;
   if (const double spread = spread_of_scale(usable, replays); spread > 0)
@@ -322,11 +324,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.misfits.push_back(there.look.likelihood.of_recording(r).misfit());
   const MotionLikelihood at_fit =
       likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held);
-  answer.contradicted = contradicted_stiffnesses(task, at_fit, errors_about(there, held));
+  answer.contradicted = contradicted_stiffnesses(task, answer.values, at_fit, errors_about(there, held));
   answer.residuals = left_residuals(at_fit);
   answer.open_information =
       open_information(at_fit, spreads_over(ranges, extent_of(there.look.posterior.axes)));
-  answer.parameters = findings_of(results, ranges, posterior);
+  answer.parameters = findings_of(results, ranges, posterior, grid.base);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, there);

@@ -33,9 +33,9 @@ std::vector<WantedMotion> wanted_at(const Task& task, const Emulator& emulator,
   return wanted;
 }
 
-/// What a search holds that was not measured.
-std::vector<HeldParameter> held_of(const Task& task) {
-  std::vector<HeldParameter> all = held_parameters(task.grid, task.replays);
+/// What a search holds that was not measured. `values`: of the axes.
+std::vector<HeldParameter> held_of(const Task& task, const std::vector<double>& values) {
+  std::vector<HeldParameter> all = held_parameters(task.grid, task.replays, values);
   if (spread_of_scale(task.grid, task.replays) > 0)  // the posterior takes it in without an approximation
     std::erase_if(all, [](const HeldParameter& held) { return held.name.ends_with("density"); });
   return all;
@@ -88,7 +88,7 @@ void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior&
     for (const Replay& replay : each.replays) wanted.push_back({&replay, candidate});
     if (each.what == half_step_name) of_draws = &each.replays;
   }
-  if (with_held) add_wanted(task, held_of(task), values, wanted);
+  if (with_held) add_wanted(task, held_of(task, values), values, wanted);
   for (const std::vector<double>& draw : draws_of(posterior))
     for (const Replay& replay : *of_draws) wanted.push_back({&replay, candidate_at(draw, task.grid)});
   task.store.prepare(wanted);
@@ -100,37 +100,67 @@ std::vector<Replay> replays_of(const Emulator& emulator) {
   return replays;
 }
 
+namespace {
+
+/// Motions at a value that is held, and how much of the way to it that is.
+struct HeldMotions {
+  double share = 1;
+  std::shared_ptr<const Motions> motions;  ///< null: none, however near
+};
+
+/// At one side of what is held; nearer where they diverge.
+HeldMotions motions_towards(const Task& task, const std::vector<double>& values, const HeldParameter& held,
+                            std::size_t side) {
+  constexpr double kNearest = 1.0 / 8;  // of the deviation
+  for (double share = 1; share >= kNearest; share /= 2) {
+    if (share < 1 && task.told) task.told({}, {-static_cast<int>(task.replays.size()), 0});
+    const ReplayCandidate candidate = candidate_with(values, task.grid, held.name, held.nearer(side, share));
+    std::vector<ReplayResult> results;
+    for (const Replay& replay : task.replays) {
+      results.push_back(task.store.run(replay, candidate));
+      task.tell_motion();
+    }
+    if (all_finite(results))
+      return {share, std::make_shared<const Motions>(Motions{task.replays, std::move(results)})};
+  }
+  return {};
+}
+
+}  // namespace
+
 std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
                                        const std::vector<ReplayResult>& here) {
   std::vector<KnownError> errors;
   const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
-  const std::vector<HeldParameter> all = held_of(task);
+  const std::vector<HeldParameter> all = held_of(task, values);
   std::vector<WantedMotion> wanted;
   add_wanted(task, all, values, wanted);
   task.store.prepare(wanted);
   for (const HeldParameter& held : all) {
-    std::array<std::vector<ReplayResult>, 2> ends;
-    for (const std::size_t side : {0, 1})
-      for (const Replay& replay : task.replays) {
-        ends[side].push_back(
-            task.store.run(replay, candidate_with(values, task.grid, held.name, held.values[side])));
-        task.tell_motion();
-      }
-    if (!all_finite(ends[0]) || !all_finite(ends[1])) continue;
-    const auto low = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[0])}),
-               high = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[1])});
-    KnownError error{{{-0.5, low}, {0.5, high}}, held.shared};
-    error.bend = {{0.5, low}, {-1, middle}, {0.5, high}};
+    HeldMotions low = motions_towards(task, values, held, 0), high = motions_towards(task, values, held, 1);
+    if (!low.motions && !high.motions) continue;
+    const bool bends = low.motions && high.motions && low.share == 1 && high.share == 1;
+    for (HeldMotions* const side : {&low, &high})
+      if (!side->motions) *side = {0, middle};
+    const double slope = 1 / (low.share + high.share);
+    KnownError error{{{-slope, low.motions}, {slope, high.motions}}, held.shared};
+    if (bends) error.bend = {{0.5, low.motions}, {-1, middle}, {0.5, high.motions}};
     error.name = held.name;
     errors.push_back(std::move(error));
   }
   return errors;
 }
 
-void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const std::vector<KnownError>& errors,
-                  std::vector<std::string>& warnings) {
+void warn_of_held(const Task& task, const std::vector<double>& values, const MotionLikelihood& likelihood,
+                  const std::vector<KnownError>& errors, std::vector<std::string>& warnings) {
+  for (const HeldParameter& held : held_of(task, values))
+    if (std::none_of(errors.begin(), errors.end(),
+                     [&](const auto& error) { return error.name == held.name; }))
+      warnings.push_back(held.name + " was not measured, and motions at other values of it diverge: the " +
+                         "intervals do not allow for an error of it. Measure it (--hold " + held.name +
+                         "=VALUE:measured), or take a shorter --time-step");
   for (std::size_t e = 0; e < errors.size(); ++e)
-    for (const HeldParameter& held : held_parameters(task.grid, task.replays))
+    for (const HeldParameter& held : held_parameters(task.grid, task.replays, values))
       if (errors[e].name == held.name && likelihood.spread_of(e) < kFarBetter)
         warnings.push_back(held.name +
                            (task.grid.deviations.contains(held.name)
@@ -139,12 +169,13 @@ void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const st
                            ": search it as well");
 }
 
-std::vector<std::string> contradicted_stiffnesses(const Task& task, const MotionLikelihood& likelihood,
+std::vector<std::string> contradicted_stiffnesses(const Task& task, const std::vector<double>& values,
+                                                  const MotionLikelihood& likelihood,
                                                   const std::vector<KnownError>& errors) {
   constexpr double kAnother = 0.25;  // of the standard deviation assumed
   constexpr double kSure = 2;        // standard deviations of what the recordings tell
   std::vector<std::string> texts;
-  for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
+  for (const HeldParameter& held : held_parameters(task.grid, task.replays, values)) {
     if (!is_stiffness(held.name) || task.grid.deviations.contains(held.name)) continue;
     const auto error = std::find_if(errors.begin(), errors.end(),
                                     [&](const KnownError& each) { return each.name == held.name; });
@@ -152,11 +183,11 @@ std::vector<std::string> contradicted_stiffnesses(const Task& task, const Motion
     const auto e = static_cast<std::size_t>(error - errors.begin());
     const double asked = likelihood.asked_of(e), spread = likelihood.spread_of(e);
     if (!(std::abs(asked) > std::max(kAnother, kSure * spread) && spread < kFarBetter)) continue;
-    const double here = std::sqrt(held.values[0] * held.values[1]), factor = held.values[1] / here;
-    const std::string unit = held.name == "young" ? " N/m" : " N m";  // of sheets alone
-    texts.push_back(held.name + " was held at " + data::format_short(here) + unit +
+    const double factor = held.values[1] / held.at;
+    const std::string unit = " " + unit_of(parameter_named(held.name), task.grid.base);
+    texts.push_back(held.name + " was held at " + data::format_short(held.at) + unit +
                     ", which was not measured, and the recordings ask for about " +
-                    data::format_short(here * std::pow(factor, asked)) + unit +
+                    data::format_short(held.at * std::pow(factor, asked)) + unit +
                     ": what else they tell hangs on it. Search it too (" + option_of(held.name) + ")");
   }
   return texts;

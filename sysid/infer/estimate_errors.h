@@ -48,17 +48,20 @@ void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior&
                     const std::vector<FinerSettings>& finer, bool with_held);
 
 /// By what is held and not measured, about an estimate: how the motion changes with it, and how that bends.
-/// What diverges is left out.
+/// Where a motion diverges one nearer is taken, down to an eighth of the way, or the other side alone, and
+/// the change is linear. What diverges on both sides is left out; warn_of_held names it.
 std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
                                        const std::vector<ReplayResult>& here);
 
-/// Names what was held without a measurement and what the recordings tell far better than was assumed.
-void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const std::vector<KnownError>& errors,
-                  std::vector<std::string>& warnings);
+/// Names what was held without a measurement and the `errors` lack, and what the recordings tell far better
+/// than was assumed. `values`: the estimate.
+void warn_of_held(const Task& task, const std::vector<double>& values, const MotionLikelihood& likelihood,
+                  const std::vector<KnownError>& errors, std::vector<std::string>& warnings);
 
 /// Names a stiffness that was held without a measurement where the recordings tell that it is another. How
 /// the motion changes with it was seen at one estimate: a ridge of it and friction leads away from there.
-std::vector<std::string> contradicted_stiffnesses(const Task& task, const MotionLikelihood& likelihood,
+std::vector<std::string> contradicted_stiffnesses(const Task& task, const std::vector<double>& values,
+                                                  const MotionLikelihood& likelihood,
                                                   const std::vector<KnownError>& errors);
 
 /// What the emulator misses at some draws of a posterior, and what half the step of time changes there other

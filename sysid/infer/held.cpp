@@ -47,28 +47,36 @@ const data::RecordedGrasp* pinch_of(const std::vector<Replay>& replays) {
 
 }  // namespace
 
-std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays) {
-  std::vector<double> first;
-  for (const Axis& axis : grid.axes) first.push_back(axis.values.front());
-  const ReplayCandidate candidate = candidate_at(first, grid);
+double HeldParameter::nearer(std::size_t side, double share) const {
+  const double end = values[side];
+  if (share == 1) return end;
+  return values[0] > 0 ? at * std::pow(end / at, share) : at + share * (end - at);
+}
+
+std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays,
+                                           const std::vector<double>& at) {
+  const ReplayCandidate candidate = candidate_at(at, grid);
   std::vector<HeldParameter> held;
-  for (const ParameterInfo& info : known_parameters()) {
-    const auto stated = grid.deviations.find(info.name);
-    const Axis* const axis = axis_of(info.name, grid);
-    if (stated != grid.deviations.end() && axis != nullptr && axis->values.size() == 1)
-      held.push_back({info.name, within(axis->values.front(), stated->second, info.low)});
+  for (const Parameter& parameter : known_parameters()) {
+    const auto stated = grid.deviations.find(parameter.name);
+    const Axis* const axis = axis_of(parameter.name, grid);
+    if (stated == grid.deviations.end() || axis == nullptr || axis->values.size() != 1) continue;
+    const double value = axis->values.front();
+    held.push_back({parameter.name, value, within(value, stated->second, parameter.low)});
   }
-  const auto add = [&](const char* name, double value, double factor) {
-    if (!is_stated(name, grid)) held.push_back({name, {value / factor, factor * value}});
+  const auto add = [&](const char* name, double factor) {
+    if (is_stated(name, grid)) return;
+    const double value = parameter_named(name).get(candidate, grid.base);
+    held.push_back({name, value, {value / factor, factor * value}});
   };
   if (std::any_of(replays.begin(), replays.end(), [](const Replay& r) { return r.recording.has_table; }))
-    add("friction", candidate.solid ? candidate.solid->friction : candidate.material.friction, kFriction);
+    add("friction", kFriction);
   if (candidate.solid) {
-    add("density", candidate.solid->density, kWeight);
+    add("density", kWeight);
   } else {
-    add("areal_density", candidate.material.areal_density, kWeight);
-    if (is_searched("bending", grid)) add("young", candidate.material.membrane_stiffness, kStiffness);
-    if (is_searched("young", grid)) add("bending", candidate.material.bending_rigidity, kStiffness);
+    add("areal_density", kWeight);
+    if (is_searched("bending", grid)) add("young", kStiffness);
+    if (is_searched("young", grid)) add("bending", kStiffness);
   }
   double yaw = 0, height = 0;
   for (const Replay& replay : replays) {
@@ -77,12 +85,12 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
   }
   const auto add_bound = [&](const char* name, double bound) {
     if (bound > 0 && !is_stated(name, grid))
-      held.push_back({name, {-bound / std::sqrt(3.0), bound / std::sqrt(3.0)}, false});
+      held.push_back({name, 0, {-bound / std::sqrt(3.0), bound / std::sqrt(3.0)}, false});
   };
   const auto add_angle = [&](const char* name, double recorded) {
     const Axis* const axis = axis_of(name, grid);
     const double angle = axis != nullptr ? axis->values.front() : recorded;
-    if (!is_stated(name, grid)) held.push_back({name, {angle - kPinch, angle + kPinch}, false});
+    if (!is_stated(name, grid)) held.push_back({name, angle, {angle - kPinch, angle + kPinch}, false});
   };
   if (const data::RecordedGrasp* const pinch = pinch_of(replays)) {
     if (pinch->direction.isZero()) add_angle("grasp_direction", 0);
@@ -91,6 +99,12 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
   add_bound("start_yaw", yaw);
   add_bound("table_height", height);
   return held;
+}
+
+std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays) {
+  std::vector<double> first;
+  for (const Axis& axis : grid.axes) first.push_back(axis.values.front());
+  return held_parameters(grid, replays, first);
 }
 
 ReplayCandidate candidate_with(const std::vector<double>& values, const GridSettings& grid,

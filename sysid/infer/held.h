@@ -10,8 +10,12 @@ namespace flash::sysid {
 /// What moves the cloth and was neither searched nor measured, one standard deviation to both sides.
 struct HeldParameter {
   std::string name;
+  double at;                     ///< what the search holds it at, in the parameter's unit
   std::array<double, 2> values;  ///< low, high
   bool shared = true;            ///< one value for all recordings
+
+  /// A part of the way from `at` to the low or the high value: by a factor where both are a factor away.
+  double nearer(std::size_t side, double share) const;
 };
 
 /// What was stated with a standard deviation. Friction within a factor of 2 of the value that the search
@@ -21,6 +25,11 @@ struct HeldParameter {
 /// sqrt(3), where it has any. Of a pinch its pitch, and its direction where the recording does not give one,
 /// within 0.2 rad: fingers fold what they find. The other properties of the asset, shape and size of the
 /// grasp and what was fixed count as known.
+/// `at`: values of the axes, for what follows these (bending of a plate of which young is searched).
+std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays,
+                                           const std::vector<double>& at);
+
+/// At the first values of the axes.
 std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays);
 
 /// The candidate at `values`, with one parameter at another value than the search holds it at.

@@ -9,6 +9,23 @@
 
 namespace flash::sysid {
 
+namespace {
+
+std::size_t searched_of(const std::vector<Axis>& axes) {
+  return static_cast<std::size_t>(
+      std::count_if(axes.begin(), axes.end(), [](const Axis& axis) { return axis.values.size() > 1; }));
+}
+
+constexpr std::size_t kMostRefined = 4;  // parameters
+
+}  // namespace
+
+std::size_t few_motions(const std::vector<Axis>& axes) { return searched_of(axes) == kMostRefined ? 81 : 30; }
+
+std::size_t many_motions(const std::vector<Axis>& axes) {
+  return searched_of(axes) == kMostRefined ? 256 : 100;
+}
+
 std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
                                       const std::vector<Axis>& finer, bool told_own) {
   Emulator emulator{{}, finer.empty() ? own_mesh : no_cells};
@@ -61,14 +78,14 @@ std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes) 
     own *= std::max<std::size_t>(count, 4);
     finer *= std::max<std::size_t>(thin[k].values.size(), 2);
   }
-  if (fewest > few_motions) return {0, 0};
-  return {std::min(own, many_motions), std::min(finer, many_motions)};
+  if (fewest > few_motions(axes)) return {0, 0};
+  return {std::min(own, many_motions(axes)), std::min(finer, many_motions(axes))};
 }
 
 std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
                                 bool finer, const std::vector<KnownError>& errors,
                                 std::vector<KnownError>& held, bool many) {
-  const std::size_t most = many ? many_motions : few_motions;
+  const std::size_t most = many ? many_motions(task.ranges) : few_motions(task.ranges);
   const std::vector<Axis> axes = lattice(extent, task.ranges, many ? 4 : 3, most);
   if (cartesian_product(axes).size() > most) return std::nullopt;
   std::optional<Emulator> emulator = emulator_over(
@@ -153,8 +170,17 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
   const bool finer = found.emulator.share != own_mesh;
   Extent extent = next_lattice(extent_of(found.axes), found.look.posterior, task.ranges);
   if (!reaches_beyond(extent, found.axes) &&
-      !is_finer(lattice(extent, task.ranges, 3, few_motions), found.axes) && !misses_much(task, found))
+      !is_finer(lattice(extent, task.ranges, 3, few_motions(task.ranges)), found.axes) &&
+      !misses_much(task, found))
     return found;
+  if (const std::size_t searched = searched_of(task.ranges); searched > kMostRefined) {
+    found.unrefined = std::to_string(searched) +
+                      " parameters are searched together: none is simulated about the answer, which is "
+                      "interpolated between the values searched, and may be off by more than its intervals "
+                      "say. Search at most " +
+                      std::to_string(kMostRefined) + " (--hold the others), or more values of each";
+    return found;
+  }
   constexpr int kDense = 3;          // lattices of many motions
   constexpr double kNarrower = 0.8;  // cells over cells, for a lattice more
   constexpr int kSettling =
@@ -165,7 +191,11 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
     if (many) ++dense;
     std::optional<Found> there =
         look_about(task, extent, found.look.posterior.values(), finer, found.errors, held, many);
-    if (!there) break;
+    if (!there) {
+      found.unrefined =
+          "a motion nearer to the answer diverged: the answer is interpolated between those farther away";
+      break;
+    }
     found = std::move(*there);
     Extent next = next_lattice(extent, found.look.posterior, task.ranges);
     if (next == extent) {
@@ -174,7 +204,7 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
       many = true;
       if (likely_alone) {
         next = extent_of(found.look.posterior.axes);
-        if (!is_finer(lattice(next, task.ranges, 4, many_motions), found.axes, kNarrower)) break;
+        if (!is_finer(lattice(next, task.ranges, 4, many_motions(task.ranges)), found.axes, kNarrower)) break;
       }
     } else if (round >= kSettling) {
       many = true;

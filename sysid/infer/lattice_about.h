@@ -1,5 +1,6 @@
 #pragma once
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -10,9 +11,14 @@
 
 namespace flash::sysid {
 
-inline constexpr int lattice_rounds = 8;          // of motions about an answer
-inline constexpr std::size_t few_motions = 30;    // of a lattice
-inline constexpr std::size_t many_motions = 100;  // where the emulator by few misses too much
+inline constexpr int lattice_rounds = 8;  // of motions about an answer
+
+/// Motions of a lattice over what is searched: three values of each of up to four parameters. Of five and
+/// more nothing is simulated about the answer.
+std::size_t few_motions(const std::vector<Axis>& axes);
+
+/// Where the emulator by few misses too much: four values of each.
+std::size_t many_motions(const std::vector<Axis>& axes);
 
 /// The motions at every point of `axes`; with `finer` axes (none: empty) those of a finer mesh at theirs.
 /// Empty where one diverged or there is no finer mesh.
@@ -26,6 +32,7 @@ struct Found {
   Look look;
   Estimate estimate;
   std::vector<KnownError> errors;  ///< all that the look knows
+  std::string unrefined = {};      ///< why motions about it are missing that were asked for; mostly empty
 };
 
 /// Looks twice: for the estimate, and again with what solving it says of errors. `held`: errors by what is
@@ -42,6 +49,7 @@ std::optional<Found> look_about(const Task& task, const Extent& extent, const st
 
 /// Motions simulated anew about the answer, where few simulations do: again while it leaves them or takes too
 /// little of them; with more of them where the emulator misses much, and then about what is likely alone.
+/// Found says where they were asked for and could not be had.
 Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held);
 
 /// Simulations of one recording in a round of it, on the own mesh and on the finer one, at most; none where

@@ -63,9 +63,8 @@ Eigen::MatrixXd walkers_of(const TensorSpline& spline, double least, unsigned se
 
 std::vector<Axis> in_own_coordinates(std::vector<Axis> axes) {
   for (Axis& axis : axes)
-    for (const ParameterInfo& info : known_parameters())
-      if (info.name == axis.name && info.material && info.name != "poisson")
-        axis.logarithmic = axis.values.front() > 0;
+    if (const Parameter* const found = find_parameter(axis.name))
+      if (found->material && axis.name != "poisson") axis.logarithmic = axis.values.front() > 0;
   return axes;
 }
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include "data/chi_square.h"
 #include "data/text.h"
@@ -15,23 +14,9 @@ namespace {
 constexpr double kExcluded = data::chi_square_95_of_1;  // deviance over the least
 constexpr double kLeastBits = 1;
 
-/// What is usual, 5 to 95 % of woven and knitted fabrics, paper and film, as coordinates of an axis: bending
-/// of 618 fabrics 1.1 to 110 uN m, membranes of 10 to 2000 N/m. Of another parameter the searched range.
-std::array<double, 2> usual_of(const Axis& axis) {
-  static const std::map<std::string, std::array<double, 2>> usual = {{"young", {10, 2000}},
-                                                                     {"poisson", {0, 0.5}},
-                                                                     {"bending", {1.1e-6, 1.1e-4}},
-                                                                     {"bending_ratio", {0.2, 5}},
-                                                                     {"young_ratio", {0.2, 5}},
-                                                                     {"shear_ratio", {0.01, 1}},
-                                                                     {"friction", {0.1, 1}},
-                                                                     {"areal_density", {0.03, 0.5}},
-                                                                     {"density", {100, 2000}},
-                                                                     {"air_drag", {0.1, 10}},
-                                                                     {"stiffness_damping", {1e-4, 1e-1}}};
-  const auto found = usual.find(axis.name);
-  const auto [low, high] =
-      found == usual.end() ? std::array{axis.values.front(), axis.values.back()} : found->second;
+/// As coordinates of an axis.
+std::array<double, 2> usual_of(const Axis& axis, const MaterialBase& base) {
+  const auto [low, high] = usual_range(parameter_named(axis.name), base);
   return axis.logarithmic ? std::array{std::log(low), std::log(high)} : std::array{low, high};
 }
 
@@ -85,7 +70,7 @@ std::string note_of(const ParameterFinding& finding, bool open_below, bool open_
 }  // namespace
 
 std::vector<ParameterFinding> findings_of(const GridResults& results, const std::vector<Axis>& searched,
-                                          const Posterior& posterior) {
+                                          const Posterior& posterior, const MaterialBase& base) {
   std::vector<ParameterFinding> findings;
   for (std::size_t k = 0; k < searched.size(); ++k) {
     ParameterFinding finding = empty_finding(results, k);
@@ -110,7 +95,7 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
                    high = std::max(mode, posterior.quantile(k, 0.975));
       finding.interval95 = {below ? range.values.front() : value_of(looked, low),
                             above ? range.values.back() : value_of(looked, high)};
-      const std::array<double, 2> usual = usual_of(range);
+      const std::array<double, 2> usual = usual_of(range, base);
       const double from = below ? std::min(usual[0], low) : low, to = above ? std::max(usual[1], high) : high;
       finding.bits = std::log2((usual[1] - usual[0]) / std::max(to - from, 1e-12));
       finding.identifiable = (below && above) || *finding.bits < kLeastBits ? Identifiable::no

@@ -17,6 +17,12 @@
 #include "sim/device_error.h"
 #include "sim/law/vertex_contact.h"
 
+namespace flash::source_digest {
+
+std::string_view motions();  // of all that decides how a candidate moves
+
+}  // namespace flash::source_digest
+
 namespace flash::sysid {
 namespace {
 
@@ -98,7 +104,7 @@ std::string key_of(const Replay& replay, const ReplayCandidate& candidate, const
   const sim::Environment world = make_environment(replay, candidate);
   Bytes bytes;
   bytes.add_text(std::string(kMagic));  // a file of another format has another name
-  bytes.add_text(FLASH_VERSION);
+  bytes.add_text(std::string(source_digest::motions()));
   bytes.add_matrix(replay.recording.mesh.vertices);
   bytes.add_matrix(replay.recording.mesh.triangles);
   bytes.add_matrix(world.state.positions);
@@ -206,6 +212,10 @@ std::optional<ReplayResult> load(const Replay& replay, const std::vector<int>& k
 
 }  // namespace
 
+std::string motion_key(const Replay& replay, const ReplayCandidate& candidate) {
+  return key_of(replay, make_environment(replay, candidate), scored_steps(replay));
+}
+
 MotionStore::MotionStore(const std::string& folder) : folder_(folder) {
   std::filesystem::create_directories(folder);
   data::remove_old_leftovers(folder, kExtension);
@@ -257,7 +267,7 @@ void MotionStore::prepare(const std::vector<WantedMotion>& wanted) const {
   std::map<const Replay*, std::vector<ReplayCandidate>> batches;
   for (const WantedMotion& motion : wanted) {
     const Replay& replay = *motion.replay;
-    const std::string key = key_of(replay, motion.candidate, scored_steps(replay));
+    const std::string key = motion_key(replay, motion.candidate);
     if (!std::filesystem::exists(path_of(key))) batches[motion.replay].push_back(motion.candidate);
   }
   if (batches.empty()) return;

@@ -11,13 +11,16 @@ struct WantedMotion {
   ReplayCandidate candidate;
 };
 
+/// What names a motion: the SHA-256 of everything that decides it.
+std::string motion_key(const Replay& replay, const ReplayCandidate& candidate);
+
 /// A folder of simulated motions, so that the same candidates can be scored again without simulating them:
 /// against another recording of the same motion, under another objective, in a search with more values. A
 /// motion is kept at the steps around its keyframes only, in double precision, in a file of its own named by
-/// the SHA-256 of everything that decides it (sheet, start, grippers, table, solver, material). Files are
-/// written whole or not at all, with this name and the SHA-256 of their numbers; several programs may share a
-/// folder. Nothing waits for the disk: a file that a power cut left otherwise than it was written is
-/// simulated again.
+/// the SHA-256 of everything that decides it (sheet, start, grippers, table, solver, material, and the
+/// sources of the solver: motions of another state of them are simulated again). Files are written whole or
+/// not at all, with this name and the SHA-256 of their numbers; several programs may share a folder. Nothing
+/// waits for the disk: a file that a power cut left otherwise than it was written is simulated again.
 class MotionStore {
  public:
   /// Creates the folder; removes what programs that were killed a day ago or earlier left in it. Throws

@@ -47,9 +47,8 @@ std::string grasp_shapes(const std::vector<Replay>& replays) {
 }
 
 bool describes_recording(const std::string& name) {
-  const auto& known = known_parameters();
-  return std::any_of(known.begin(), known.end(),
-                     [&](const ParameterInfo& info) { return info.name == name && !info.material; });
+  const Parameter* const found = find_parameter(name);
+  return found != nullptr && !found->material;
 }
 
 /// Values that the search told or held of what describes a recording.

@@ -17,9 +17,8 @@ namespace flash::sysid {
 namespace {
 
 bool is_material(const std::string& name) {
-  for (const ParameterInfo& info : known_parameters())
-    if (info.name == name) return info.material;
-  return false;
+  const Parameter* const found = find_parameter(name);
+  return found != nullptr && found->material;
 }
 
 const Axis* axis_named(const std::vector<Axis>& axes, const std::string& name) {
@@ -28,30 +27,15 @@ const Axis* axis_named(const std::vector<Axis>& axes, const std::string& name) {
   return found == axes.end() ? nullptr : &*found;
 }
 
-std::map<std::string, double> parameters_of(const data::SheetMaterial& material,
-                                            std::optional<double> thickness) {
-  std::map<std::string, double> parameters = {
-      {"young", material.membrane_stiffness / thickness.value_or(1.0)},
-      {"poisson", material.poissons_ratio},
-      {"bending", material.bending_rigidity},
-      {"bending_ratio", material.weave.bending_ratio},
-      {"young_ratio", material.weave.young_ratio},
-      {"shear_ratio", material.weave.shear_ratio},
-      {"friction", material.friction},
-      {"areal_density", material.areal_density},
-      {"air_drag", material.air_drag},
-      {"stiffness_damping", material.stiffness_damping}};
-  if (std::isfinite(material.yield_curvature)) parameters["yield_curvature"] = material.yield_curvature;
+/// Those of the asset.
+std::map<std::string, double> parameters_of(const ReplayCandidate& candidate, const MaterialBase& base) {
+  std::map<std::string, double> parameters;
+  for (const Parameter& parameter : known_parameters()) {
+    if (!parameter.material || !is_of(parameter, base)) continue;
+    const double value = parameter.get(candidate, base);
+    if (std::isfinite(value)) parameters[parameter.name] = value;  // most bend elastically, however far
+  }
   return parameters;
-}
-
-std::map<std::string, double> parameters_of(const ReplayCandidate& candidate,
-                                            std::optional<double> thickness) {
-  if (!candidate.solid) return parameters_of(candidate.material, thickness);
-  const data::SolidMaterial& material = *candidate.solid;
-  return {{"young", material.youngs_modulus}, {"poisson", material.poissons_ratio},
-          {"density", material.density},      {"friction", material.friction},
-          {"air_drag", material.air_drag},    {"stiffness_damping", material.stiffness_damping}};
 }
 
 // What was held, and on whose word: a measurement, or an assumption of the command line or the asset.
@@ -302,7 +286,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   }
   const CandidateResult& estimate = answer.estimate;
   const ReplayCandidate candidate = candidate_at(answer.values, settings);
-  summary.best = parameters_of(candidate, settings.base.thickness);
+  summary.best = parameters_of(candidate, settings.base);
   if (!candidate.solid) summary.membrane_stiffness = candidate.material.membrane_stiffness;
   summary.best_score = answer.fit.score.score;
   summary.score_on_mesh = estimate.score;
@@ -321,7 +305,8 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   if (summary.parameters.size() == answer.parameters.size()) summary.covariance_log = answer.covariance_log;
   if (answer.samples.rows() > 0) add_samples(summary, answer);
   summary.fixed = fixed_of(summary, settings);
-  for (const HeldParameter& held : held_parameters(settings, replays)) summary.held[held.name] = held.values;
+  for (const HeldParameter& held : held_parameters(settings, replays, answer.values))
+    summary.held[held.name] = held.values;
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const Misfit misfit = r < answer.misfits.size() ? answer.misfits[r] : Misfit{};
     summary.recordings.push_back(

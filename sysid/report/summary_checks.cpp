@@ -10,12 +10,6 @@
 namespace flash::sysid {
 namespace {
 
-const ParameterInfo* info_of(const std::string& name) {
-  for (const ParameterInfo& info : known_parameters())
-    if (info.name == name) return &info;
-  return nullptr;
-}
-
 void check_within(const std::string& path, const std::string& field, double value, double low, double high) {
   if (!(value >= low && value <= high))
     throw data::input_error(path, field,
@@ -24,7 +18,7 @@ void check_within(const std::string& path, const std::string& field, double valu
 }
 
 void check_value(const std::string& path, const std::string& field, const std::string& name, double value) {
-  const ParameterInfo* const info = info_of(name);
+  const Parameter* const info = find_parameter(name);
   if (info == nullptr) throw data::input_error(path, field, "found \"" + name + "\", which is no parameter");
   check_within(path, field + "." + name, value, info->low, info->high);
 }
@@ -51,7 +45,7 @@ void check_answer(const std::string& path, const std::string& field, const Param
   if (!(low <= high)) throw data::input_error(path, field + ".interval95", "expected its lower end first");
   const double first = finding.values.front(), last = finding.values.back();
   // What is open may reach beyond these values, to the ends of an earlier search.
-  const ParameterInfo* const info = info_of(finding.name);
+  const Parameter* const info = find_parameter(finding.name);
   const bool open = info != nullptr && finding.identifiable != Identifiable::yes;
   const bool below = scales || (open && finding.identifiable != Identifiable::lower_bound),
              above = scales || (open && finding.identifiable != Identifiable::upper_bound);
@@ -112,7 +106,7 @@ void check_values(const Summary& summary, const std::string& path) {
       throw data::input_error(path, "best.parameters." + finding.name, "missing, expected a number");
     if (finding.values.empty() || finding.values.size() != finding.scores.size())
       throw data::input_error(path, field + ".profile", "expected as many scores as values, one at least");
-    const ParameterInfo* const info = info_of(finding.name);
+    const Parameter* const info = find_parameter(finding.name);
     if (info == nullptr) throw data::input_error(path, field, "is no parameter");
     if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
     for (const double value : finding.values)

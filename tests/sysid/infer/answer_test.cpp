@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -80,6 +81,69 @@ TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   EXPECT_EQ(answer.values.front(), *bending.estimate);
   EXPECT_EQ(bending.values.front(), grid.axes[0].values.front());
   EXPECT_EQ(bending.values.back(), grid.axes[0].values.back());
+}
+
+// Thickness is a power of two, so that not even rounding tells E and E t apart.
+TEST(Answer, IsThatOfTheSameMembraneAsModulusAndAsStiffness) {
+  const data::TemporaryFolder folder;
+  const auto answer = [&](std::optional<double> thickness) {
+    std::vector<Replay> replays = {short_lift(folder)};
+    GridSettings grid = bending_grid();
+    grid.base.thickness = thickness;
+    grid.rollouts = folder / "rollouts";
+    ResultsStore store(folder / (thickness ? "modulus" : "stiffness"), grid.axes, {"lift"}, {},
+                       Existing::refuse);
+    EXPECT_TRUE(grid_search(replays, grid, store));
+    GridResults results = store.results();
+    AnswerSettings asked = without_horizon();
+    asked.solver_check = false;
+    return find_answer(results, replays, grid, asked);
+  };
+  const Answer stiffness = answer({}), modulus = answer(1.0 / 2048);
+  EXPECT_EQ(stiffness.values, modulus.values);
+  EXPECT_EQ(stiffness.samples, modulus.samples);
+  EXPECT_EQ(stiffness.parameters[0].bits, modulus.parameters[0].bits);
+  EXPECT_EQ(stiffness.warnings, modulus.warnings);
+}
+
+/// A search of the first so many of these, two values each, with the truth between them.
+Answer answer_of_searched(std::size_t count, int& motions) {
+  const data::TemporaryFolder folder;
+  std::vector<Replay> replays = {short_lift(folder)};
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "1e-4:4e-4:2:log"), parse_axis("friction", "0.2:0.5:2"),
+               parse_axis("young", "15:60:2:log"), parse_axis("table_height", "-0.002:0.003:2"),
+               parse_axis("poisson", "0.2:0.4:2")};
+  grid.axes.resize(count);
+  grid.rollouts = folder / "rollouts";
+  ResultsStore store(folder / "run", grid.axes, {"lift"}, {}, Existing::refuse);
+  EXPECT_TRUE(grid_search(replays, grid, store));
+  GridResults results = store.results();
+  AnswerSettings asked = without_horizon();
+  asked.solver_check = false;
+  return find_answer(results, replays, grid, asked,
+                     [&](const AnswerWork& done, const AnswerWork&) { motions += done.motions; });
+}
+
+bool says_it_is_not_refined(const Answer& answer) {
+  return std::any_of(answer.warnings.begin(), answer.warnings.end(), [](const std::string& warning) {
+    return warning.find("parameters are searched together") != std::string::npos;
+  });
+}
+
+TEST(Answer, FourParametersAreSimulatedAboutIt) {
+  int motions = 0;
+  const Answer answer = answer_of_searched(4, motions);
+  EXPECT_GE(motions, 81);  // three values of each
+  EXPECT_FALSE(says_it_is_not_refined(answer));
+  EXPECT_NEAR(answer.values[0], 2e-4, 0.1 * 2e-4);
+}
+
+TEST(Answer, FiveParametersAreSaidNotToBeSimulatedAboutIt) {
+  int motions = 0;
+  EXPECT_TRUE(says_it_is_not_refined(answer_of_searched(5, motions)));
+  EXPECT_LT(motions, 81);
 }
 
 /// What two recordings of strips of these bending rigidities say together.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/sysid/short_lift.h"
@@ -65,6 +66,49 @@ TEST(Held, TheOtherStiffnessIsUncertainUnlessItWasMeasured) {
   EXPECT_DOUBLE_EQ(held[0].values[1], 4e-4);
   EXPECT_TRUE(held_beside({{"bending", "1e-4:4e-4:3:log"}, {"young", "10:100:3:log"}}).empty());
   EXPECT_TRUE(held_beside({{"start_yaw", "-0.1:0.1:3"}}).empty());  // neither is asked for
+}
+
+// A factor of E is the same factor of E t.
+TEST(Held, AMembraneIsHeldAlikeAsYoungsModulusAndAsStiffness) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_lift(folder)};
+  GridSettings stiffness;
+  stiffness.base.material = short_lift_material();
+  stiffness.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  GridSettings modulus = stiffness;
+  modulus.base.thickness = 1.0 / 2048;  // [m]; a power of two, so that not even rounding tells them apart
+  const std::vector<HeldParameter> as_stiffness = held_parameters(stiffness, replays),
+                                   as_modulus = held_parameters(modulus, replays);
+  ASSERT_EQ(names_of(as_stiffness), names_of(as_modulus));
+  for (std::size_t h = 0; h < as_stiffness.size(); ++h)
+    for (const std::size_t side : {0, 1})
+      for (const double share : {1.0, 0.5}) {
+        const auto candidate = [&](const GridSettings& grid, const HeldParameter& held) {
+          return candidate_with({2e-4}, grid, held.name, held.nearer(side, share));
+        };
+        EXPECT_EQ(candidate(stiffness, as_stiffness[h]).material, candidate(modulus, as_modulus[h]).material)
+            << as_stiffness[h].name;
+      }
+  const auto young = std::find_if(as_modulus.begin(), as_modulus.end(),
+                                  [](const HeldParameter& held) { return held.name == "young"; });
+  EXPECT_EQ(candidate_with({2e-4}, modulus, "young", young->values[0]).material.membrane_stiffness, 15);
+  EXPECT_EQ(candidate_with({2e-4}, modulus, "young", young->values[1]).material.membrane_stiffness, 60);
+}
+
+// D of a plate follows E: it is uncertain about what the estimate makes it.
+TEST(Held, BendingThatFollowsYoungIsHeldAboutTheEstimate) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_lift(folder)};
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.base.thickness = 1e-3;
+  grid.base.bending_from_thickness = true;
+  grid.axes = {parse_axis("young", "1e4:1e6:3:log")};
+  const double nu = grid.base.material.poissons_ratio;
+  for (const HeldParameter& held : held_parameters(grid, replays, {1e5}))
+    if (held.name == "bending") {
+      EXPECT_DOUBLE_EQ(held.at, 1e5 * 1e-9 / (12 * (1 - nu * nu)));
+    }
 }
 
 // Nobody weighed it: known to 10 %, whatever the asset says. A stated deviation takes the place of that, and

@@ -32,7 +32,7 @@ ParameterFinding bending_found(const std::string& range, double at, double sd) {
     fine[0].values.push_back(std::exp(x));
     deviance[i] = std::pow((x - std::log(at)) / sd, 2);
   }
-  return findings_of(results, axes, explore_posterior(fine, deviance)).front();
+  return findings_of(results, axes, explore_posterior(fine, deviance), {}).front();
 }
 
 TEST(Verdict, IsTheSameWhateverRangeWasTypedAndHowItWasListed) {
@@ -71,13 +71,98 @@ TEST(Verdict, ABoundThatGainsLessThanOneBitIsNotTold) {
   EXPECT_EQ(bending_found("0.9e-4:1.1e-4:3:log", 1.1e-4, 1).edge, RangeEdge::none);
 }
 
+/// A normal posterior of a parameter, whose middle and width are shares of what is searched, over that range.
+ParameterFinding found_of(const std::string& name, std::array<double, 2> range, double at, double sd,
+                          const MaterialBase& base) {
+  GridResults results;
+  results.axes = {{name, {range[0], range[1]}, false}};
+  std::vector<Axis> axes = in_own_coordinates(results.axes);
+  for (const double value : range) {
+    results.candidates.emplace_back();
+    results.candidates.back().values = {value};
+    results.candidates.back().score = 1e-3;
+  }
+  std::vector<Axis> fine = axes;
+  fine[0].values.clear();
+  constexpr int kPoints = 161;
+  const double low = coordinate_of(axes[0], range[0]), high = coordinate_of(axes[0], range[1]);
+  Eigen::VectorXd deviance(kPoints);
+  for (int i = 0; i < kPoints; ++i) {
+    const double x = low + (high - low) * i / (kPoints - 1);
+    fine[0].values.push_back(value_of(axes[0], x));
+    deviance[i] = std::pow((x - at) / sd, 2);
+  }
+  return findings_of(results, axes, explore_posterior(fine, deviance), base).front();
+}
+
+TEST(Verdict, IsTheSameOfEveryParameterWhateverRangeWasTyped) {
+  MaterialBase sheet, thick, solid;
+  thick.thickness = 5e-4;
+  solid.solid = data::SolidMaterial{};
+  for (const MaterialBase& base : {sheet, thick, solid})
+    for (const Parameter& parameter : known_parameters()) {
+      if (!is_of(parameter, base)) continue;
+      const auto [low, high] = usual_range(parameter, base);
+      const Axis axis = in_own_coordinates({{parameter.name, {low, high}, false}}).front();
+      const double first = coordinate_of(axis, low), width = coordinate_of(axis, high) - first;
+      const double at = first + 0.5 * width;
+      const auto over = [&](double share) {  // a range of this share of the usual about its middle
+        Axis wide = axis;
+        wide.values = {parameter.low, parameter.high};
+        const std::array<double, 2> range = {value_of(wide, at - 0.5 * share * width),
+                                             value_of(wide, at + 0.5 * share * width)};
+        return found_of(parameter.name, range, at, width / 30, base);
+      };
+      const ParameterFinding narrow = over(0.6), wide = over(1);
+      EXPECT_EQ(narrow.identifiable, Identifiable::yes) << parameter.name;
+      EXPECT_EQ(wide.identifiable, Identifiable::yes) << parameter.name;
+      // Four standard deviations of thirty; draws tell a quantile to 0.07 of one.
+      EXPECT_NEAR(*narrow.bits, std::log2(30 / (2 * 1.96)), 0.15) << parameter.name;
+      EXPECT_NEAR(*wide.bits, *narrow.bits, 0.15) << parameter.name;
+    }
+}
+
+// The same draws in both units, to the rounding of logarithms up to 20.
+TEST(Verdict, OfAMembraneIsTheSameAsModulusAndAsStiffness) {
+  constexpr double kThickness = 5e-4, kRounding = 1e-12;
+  MaterialBase sheet, thick;
+  thick.thickness = kThickness;
+  const auto axis = [](double unit) {
+    return in_own_coordinates({{"young", {5 * unit, 100 * unit, 3000 * unit}, false}});
+  };
+  for (const double falls : {1.0, 20.0, 200.0}) {  // of the deviance, from the middle to both ends
+    const Posterior stiffness = explore_posterior(axis(1), Eigen::Vector3d(falls, 0, falls));
+    Posterior modulus = stiffness;
+    modulus.axes = axis(1 / kThickness);
+    modulus.samples.array() -= std::log(kThickness);
+    modulus.estimate.array() -= std::log(kThickness);
+    const auto found = [&](const Posterior& posterior, const MaterialBase& base) {
+      GridResults results;
+      results.axes = posterior.axes;
+      for (const double value : results.axes[0].values) {
+        results.candidates.emplace_back();
+        results.candidates.back().values = {value};
+        results.candidates.back().score = 1e-3;
+      }
+      return findings_of(results, results.axes, posterior, base).front();
+    };
+    const ParameterFinding as_stiffness = found(stiffness, sheet), as_modulus = found(modulus, thick);
+    EXPECT_EQ(as_stiffness.identifiable, as_modulus.identifiable) << falls;
+    EXPECT_NEAR(*as_stiffness.bits, *as_modulus.bits, kRounding) << falls;
+    for (const std::size_t side : {0, 1}) {
+      const double end = (*as_stiffness.interval95)[side];
+      EXPECT_NEAR(end, (*as_modulus.interval95)[side] * kThickness, kRounding * end) << falls;
+    }
+  }
+}
+
 TEST(Verdict, AnEstimateBeyondTheQuantilesIsInsideItsInterval) {
   // A posterior that falls from its end steeply: its mode is there, its 2.5 % quantile is not.
   const GridResults results = searched("1e-5:1e-3:5:log");
   std::vector<Axis> inner = results.axes;
   inner[0].values = {9e-5, 1e-4, 1.1e-4, 1.2e-4, 1.3e-4};
   Posterior posterior = explore_posterior(inner, Eigen::VectorXd::LinSpaced(5, 0, 8));
-  const ParameterFinding found = findings_of(results, results.axes, posterior).front();
+  const ParameterFinding found = findings_of(results, results.axes, posterior, {}).front();
   EXPECT_LE((*found.interval95)[0], *found.estimate);
   EXPECT_GE((*found.interval95)[1], *found.estimate);
 }
