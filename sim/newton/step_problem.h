@@ -44,8 +44,8 @@ struct StepProblem {
   double relative_residual(const Iterate& iterate) const;
 
   /// Whether |r| <= tolerance |M g| for each body, and no vertex misses its weight by more than 30 times as
-  /// much. The rounding of positions turns the friction of a vertex that starts to slide: that much more may
-  /// be missing.
+  /// much. The rounding of positions turns the friction of a vertex that starts to slide, and stretches the
+  /// springs of holds: that much more may be missing.
   bool balanced(const Iterate& iterate, double tolerance) const;
 };
 
