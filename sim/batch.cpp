@@ -169,6 +169,7 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
             "batch: all environments need the same number of holds");
     require(solids_match(plan, environment),
             "batch: every environment needs a solid material for each body of tetrahedra, and for no other");
+    for (const Hold& hold : environment.holds) check_stiffness(hold);
     require(frames_exist(environment),
             "batch: a hold or an obstacle names a frame that the schedule does not have");
   }

@@ -63,7 +63,7 @@ class Batch {
  public:
   /// Throws std::invalid_argument where the environments do not have the plan's vertices and the same number
   /// of holds, where the solids of both are not the same, where a frame is not in the schedule, or the steps
-  /// do not ascend from first_step to `steps`.
+  /// do not ascend from first_step to `steps`. Throws data::InputError as check_stiffness does.
   Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments, BatchSettings settings);
   ~Batch();
   Batch(Batch&&) noexcept;

@@ -11,6 +11,7 @@
 #include "data/parallel.h"
 #include "sim/cuda/most_obstacles.h"
 #include "sim/cuda/most_vertices.h"
+#include "sim/step/springs.h"
 #ifdef FLASH_HAVE_CUDA
 #include "sim/cuda/device_error.h"
 #include "sim/cuda/devices.h"
@@ -64,6 +65,9 @@ void check_on_device(const std::vector<Environment>& environments, const BatchSe
   if (settings.projective)
     if (const std::string why = why_not_on_device(*settings.projective); !why.empty())
       throw data::InputError("--device cuda: " + why);
+  for (const Environment& environment : environments)
+    if (settings.projective && first_soft_hold(environment) != nullptr)
+      throw data::InputError("--device cuda: the projective method knows rigid holds alone; use Newton's");
   for (const Environment& environment : environments)
     if (const std::string why = why_not_on_device(environment); !why.empty())
       throw data::InputError("--device cuda: " + why);
@@ -160,8 +164,10 @@ std::vector<cuda::ReplayEnvironment> replay_environments(const Group& group, con
     return environments[static_cast<std::size_t>(group.environments[k])];
   };
   std::vector<std::shared_ptr<const cuda::HoldMotion>> motions(count);
+  std::vector<std::shared_ptr<const cuda::SpringMotions>> springs(count);
   held.resize(count);
   data::for_each_in_parallel(count, settings.threads, [&](std::size_t k) {
+    springs[k] = cuda::motion_of_springs(at(k), time_step_of(settings), group.count);
     Environment moved = at(k);
     motions[k] = std::make_shared<const cuda::HoldMotion>(
         cuda::motion_of_holds(moved, time_step_of(settings), group.count));
@@ -171,7 +177,8 @@ std::vector<cuda::ReplayEnvironment> replay_environments(const Group& group, con
   for (std::size_t k = 0; k < count; ++k) {
     // Most environments of a batch are held alike.
     if (k > 0 && *motions[k] == *motions[k - 1]) motions[k] = motions[k - 1];
-    replays.push_back(cuda::replay_environment(at(k), motions[k]));
+    if (k > 0 && springs[k] && springs[k - 1] && *springs[k] == *springs[k - 1]) springs[k] = springs[k - 1];
+    replays.push_back(cuda::replay_environment(at(k), motions[k], springs[k]));
   }
   return replays;
 }

@@ -30,13 +30,28 @@ struct HeldVertex {
 /// What is held in each step, no vertex twice in one.
 using HoldMotion = std::vector<std::vector<HeldVertex>>;
 
+/// A spring between a vertex and its place in a soft hold over a step (sim/step/springs).
+struct SpringMotion {
+  int vertex, hold;
+  int entry;                 ///< of its stiffness among those of the environment
+  std::array<bool, 3> axes;  ///< in which it acts
+  Eigen::Vector3d from, to;  ///< its place at the start and at the end of the step [m]
+
+  bool operator==(const SpringMotion&) const = default;
+};
+
+/// The springs of each step.
+using SpringMotions = std::vector<std::vector<SpringMotion>>;
+
 /// One environment: a sheet, its start, what holds it and what it meets. Environments may share motions.
 struct ReplayEnvironment {
   data::SheetMaterial material;
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
   std::vector<Load> loads;
-  std::shared_ptr<const HoldMotion> holds;  ///< by step, from first_step on
-  int hold_count = 1;                       ///< all environments have as many
+  std::shared_ptr<const HoldMotion> holds;            ///< by step, from first_step on
+  int hold_count = 1;                                 ///< all environments have as many
+  std::shared_ptr<const SpringMotions> springs = {};  ///< as `holds`; null: none
+  std::vector<double> stiffness = {};                 ///< of springs, by entry [N/m]
   std::vector<Obstacle> obstacles;
   std::shared_ptr<const Schedule> schedule;  ///< of the frames that obstacles name; none: all at rest
   double time = 0;                           ///< at which it stands [s]
@@ -81,11 +96,13 @@ struct ReplayMemory;
 /// has. A team, one processor or several, takes an environment through up to `restart_interval` steps and
 /// then another one that waits. So none waits for the others, and what an environment gets depends on its own
 /// numbers alone, bitwise. Linear problems are in single precision, energies, residuals, contact and
-/// positions in double. A held vertex moves on a straight line within a step that has to be halved.
+/// positions in double. Held vertices and places of springs move on a straight line within a step that has to
+/// be halved.
 class BatchReplay {
  public:
   /// Throws std::invalid_argument where environments do not fit the plan, have not the same bending operator,
-  /// miss holds for a step, or have more than most_obstacles; std::runtime_error with the device's message.
+  /// miss holds or springs for a step, have springs with the projective method, or have more than
+  /// most_obstacles; std::runtime_error with the device's message.
   BatchReplay(std::shared_ptr<const SheetPlan> plan, const std::vector<ReplayEnvironment>& environments,
               ReplaySettings settings);
   ~BatchReplay();

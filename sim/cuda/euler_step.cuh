@@ -11,7 +11,10 @@ namespace flash::sim::cuda {
 struct StepMotion {
   const HeldPlace* held;  ///< vertices at its end
   int held_count;
-  double* hold_forces;  ///< on the sheet, three numbers a hold, for which this step has zeros [N]
+  const SpringPlace* springs;
+  int spring_count;
+  const double* stiffness;  ///< of springs, by entry [N/m]
+  double* hold_forces;      ///< on the sheet, three numbers a hold, for which this step has zeros [N]
   const PlacedObstacle* obstacles;
   int obstacle_count;
   bool several;            ///< whether a box stands beside another obstacle
@@ -49,6 +52,7 @@ __device__ inline void forget_restrictions(const Work& w) {
 }
 
 /// The positions without forces, held vertices where they have to be: `share` of their way of the whole step.
+/// Springs pull as IncrementalPotential::pull of the CPU has it.
 __device__ inline void predict(const Work& w, const StepProblem& step, const StepMotion& motion,
                                double share) {
   for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
@@ -66,10 +70,28 @@ __device__ inline void predict(const Work& w, const StepProblem& step, const Ste
       if (held.axes >> axis & 1) *places[axis] = share == 1 ? to : from + share * (to - from);
     }
   }
+  const Springs& springs = step.springs;
+  for_sprung_vertices(springs, [&](int first) {
+    const int i = springs.list[first].place;
+    const double inertia = step.mass(w.replay.sheet, i) / (step.h * step.h);
+    Triple whole = {inertia, inertia, inertia}, place = triple(w.now.positions[i]);
+    for_springs_of_vertex(springs, first, [&](int k) {
+      const Triple own = springs.along_axes(k), way = triple(step.start[i]) + springs.moved(k) - place;
+      whole = whole + own;
+      place = place + Triple{own.x / whole.x * way.x, own.y / whole.y * way.y, own.z / whole.z * way.z};
+    });
+    // A hold may carry the vertex along other axes.
+    Point& to = w.now.positions[i];
+    const int carried = w.memory.held_axes[i];
+    if ((carried & 1) == 0) to.x = place.x;
+    if ((carried & 2) == 0) to.y = place.y;
+    if ((carried & 4) == 0) to.z = place.z;
+  });
 }
 
 /// Adds what the holds exert in a share of the step.
-__device__ inline void add_hold_forces(const Work& w, const StepMotion& motion, double share) {
+__device__ inline void add_hold_forces(const Work& w, const StepProblem& step, const StepMotion& motion,
+                                       double share) {
   for (int hold = 0; hold < w.replay.hold_count; ++hold) {
     double sums[3];
     sum_over_team(motion.held_count, sums, shared_memory<double>(), [&](int k, double(&own)[3]) {
@@ -77,6 +99,16 @@ __device__ inline void add_hold_forces(const Work& w, const StepMotion& motion, 
       for (int axis = 0; axis < 3; ++axis)
         if ((held.axes >> axis & 1) != 0 && held.holds[axis] == hold)
           own[axis] += w.now.force[3 * held.place + axis];
+    });
+    if (team_rank() == 0)
+      for (int axis = 0; axis < 3; ++axis) motion.hold_forces[3 * hold + axis] += share * sums[axis];
+    synchronize_team();
+    if (motion.spring_count == 0) continue;
+    sum_over_team(motion.spring_count, sums, shared_memory<double>(), [&](int k, double(&own)[3]) {
+      const SpringPlace& spring = motion.springs[k];
+      if (spring.hold != hold) return;
+      const Triple force = step.springs.force(k, triple(w.now.positions[spring.place]));
+      for (int axis = 0; axis < 3; ++axis) own[axis] += force[axis];
     });
     if (team_rank() == 0)
       for (int axis = 0; axis < 3; ++axis) motion.hold_forces[3 * hold + axis] += share * sums[axis];
@@ -90,6 +122,24 @@ struct StepEnd {
   double penetration;  ///< deepest vertex below a surface [m]
   double start_depth;  ///< deepest that started inside an obstacle [m]
 };
+
+/// What springs do over a step.
+struct SpringEnd {
+  double work;      ///< on the sheet [J]
+  double at_start;  ///< their energy with the vertices where they were at its start [J]
+};
+
+__device__ __noinline__ SpringEnd judge_springs(const Work& w, const StepProblem& step, double* partial) {
+  double sums[2];
+  sum_over_team(step.springs.count, sums, partial, [&](int k, double(&own)[2]) {
+    const int i = step.springs.list[k].place;
+    const Triple start = triple(step.start[i]), end = triple(w.now.positions[i]);
+    own[0] += dot(step.springs.force(k, end), end - start);
+    own[1] += step.springs.energy(k, start);
+  });
+  synchronize_team();
+  return {sums[0], sums[1]};
+}
 
 /// The end of a step, its energy as account_for_energy of the CPU has it.
 __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
@@ -124,7 +174,9 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
   });
   synchronize_team();
   const ContactEnd contact = judge_contacts(tables, step, w.now, shared_memory<double>());
-  sums[work] += contact.work;
+  const SpringEnd springs =
+      step.springs.count > 0 ? judge_springs(w, step, shared_memory<double>()) : SpringEnd{};
+  sums[work] += contact.work + springs.work;
   bool start_is_feasible = sums[moved_holds] == 0 && contact.start_depth == 0;
   for (int k = 0; k < step.obstacles.count; ++k)
     start_is_feasible = start_is_feasible && !step.obstacles.obstacles[k].moves;
@@ -142,7 +194,7 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
   const bool complementary = contact.complementarity <= gap_tolerance;
   if (!(gain <= allowed) || !complementary) return {false, finite, contact.penetration, contact.start_depth};
   const bool falls_below_start =
-      w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + allowed;
+      w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + springs.at_start + allowed;
   return {!start_is_feasible || falls_below_start, finite, contact.penetration, contact.start_depth};
 }
 
@@ -180,6 +232,16 @@ __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const S
       planes = planes && w.obstacles[k].shape == ObstacleShape::plane;
     step.obstacles = {w.obstacles, motion.obstacle_count,     motion.several,
                       step.h,      {w.replay.exit_speed, {}}, planes};
+    step.numbers.own_blocks = w.memory.own_blocks;
+  });
+}
+
+/// The springs from a share of the step to another one, behind begin_obstacles.
+__device__ inline void begin_springs(const Work& w, StepProblem& step, const StepMotion& motion, double begin,
+                                     double end) {
+  if (motion.spring_count == 0) return;
+  change_common([&] {
+    step.springs = {motion.springs, motion.spring_count, motion.stiffness, begin, end};
     step.numbers.own_blocks = w.memory.own_blocks;
   });
 }
@@ -231,6 +293,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
                          const SheetState& state, ReplayStats& stats, bool last_try) {
   begin_damping(w, step);
   begin_obstacles(w, step, motion, begin, end);
+  begin_springs(w, step, motion, begin, end);
   PartEnd part = solve_part(w, step, motion, end, stats);
   if (part.end.start_depth > 0) part = leave_obstacles(w, step, motion, end, stats, part);
   const bool solved = part.solved;
@@ -241,7 +304,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   const double residual = judged.finite ? w.now.residual / step.material->force_scale : INFINITY;
   if (!(residual <= stats.residual)) stats.residual = residual;
   ++stats.substeps;
-  add_hold_forces(w, motion, end - begin);
+  add_hold_forces(w, step, motion, end - begin);
   stats.penetration = worse_of(stats.penetration, judged.penetration);
   stats.converged = judged.sound && balanced(step, w.now, w.replay.tolerance);
   for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {

@@ -33,8 +33,9 @@ std::vector<FramePose> frame_poses(const ReplayEnvironment& environment, double 
 int FlatMotions::add(const ReplayEnvironment& environment, double time_step, int steps,
                      const std::vector<int>& position) {
   const HoldMotion* motion = environment.holds.get();
-  const auto [found, is_new] = motions_.emplace(Key{motion, environment.schedule.get(), environment.time},
-                                                static_cast<int>(motions_.size()));
+  const auto [found, is_new] =
+      motions_.emplace(Key{motion, environment.springs.get(), environment.schedule.get(), environment.time},
+                       static_cast<int>(motions_.size()));
   if (!is_new) return found->second;
   const std::vector<FramePose> own = frame_poses(environment, time_step, steps, frames);
   poses.insert(poses.end(), own.begin(), own.end());
@@ -54,6 +55,20 @@ int FlatMotions::add(const ReplayEnvironment& environment, double time_step, int
     most = std::max(most, static_cast<int>(holds.size()) - starts.back());
   }
   starts.push_back(static_cast<int>(holds.size()));
+  for (int k = 0; k < steps; ++k) {
+    spring_starts.push_back(static_cast<int>(springs.size()));
+    if (environment.springs == nullptr) continue;
+    for (const SpringMotion& spring : (*environment.springs)[k])
+      springs.push_back({position[spring.vertex],
+                         int{spring.axes[0]} | 2 * int{spring.axes[1]} | 4 * int{spring.axes[2]},
+                         spring.hold,
+                         spring.entry,
+                         {spring.from.x(), spring.from.y(), spring.from.z()},
+                         {spring.to.x(), spring.to.y(), spring.to.z()}});
+    std::stable_sort(springs.begin() + spring_starts.back(), springs.end(),
+                     [](const SpringPlace& a, const SpringPlace& b) { return a.place < b.place; });
+  }
+  spring_starts.push_back(static_cast<int>(springs.size()));
   return found->second;
 }
 

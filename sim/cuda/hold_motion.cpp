@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sim/step/springs.h"
+
 namespace flash::sim::cuda {
 
 using data::Points;
@@ -20,6 +22,7 @@ std::vector<HeldVertex> held_at(const Environment& environment, double time) {
     const Eigen::Isometry3d frame = frame_pose(environment, hold.frame, time);
     const Points places = held_places(hold, held, time);
     for (std::size_t v = 0; v < held.vertices.size(); ++v) {
+      if (!is_rigid(hold, v)) continue;
       int& at = place[static_cast<std::size_t>(held.vertices[v])];
       if (at < 0) {
         at = static_cast<int>(all.size());
@@ -36,6 +39,14 @@ std::vector<HeldVertex> held_at(const Environment& environment, double time) {
     }
   }
   return all;
+}
+
+/// Where the stiffness of each hold begins among those of an environment.
+std::vector<int> first_entries(const Environment& environment) {
+  std::vector<int> first = {0};
+  for (const Hold& hold : environment.holds)
+    first.push_back(first.back() + static_cast<int>(hold.stiffness.size()));
+  return first;
 }
 
 /// Whether the hold acts in the step from `start` to `end` [s].
@@ -77,14 +88,37 @@ HoldMotion motion_of_holds(Environment& environment, double time_step, int steps
   return motion;
 }
 
-ReplayEnvironment replay_environment(const Environment& environment,
-                                     std::shared_ptr<const HoldMotion> holds) {
+std::shared_ptr<const SpringMotions> motion_of_springs(Environment environment, double time_step, int steps) {
+  if (first_soft_hold(environment) == nullptr) return nullptr;
+  const std::vector<int> first = first_entries(environment);
+  auto motion = std::make_shared<SpringMotions>();
+  for (int k = 0; k < steps; ++k) {
+    const double time = environment.state.time + time_step;
+    update_holds(environment, time);
+    std::vector<SpringMotion>& step = motion->emplace_back();
+    for (const Spring& spring : springs_of(environment, time))
+      step.push_back({spring.vertex,
+                      spring.hold,
+                      first[static_cast<std::size_t>(spring.hold)] + spring.entry,
+                      {spring.acts[0] > 0, spring.acts[1] > 0, spring.acts[2] > 0},
+                      spring.before,
+                      spring.place});
+    environment.state.time = time;
+  }
+  return motion;
+}
+
+ReplayEnvironment replay_environment(const Environment& environment, std::shared_ptr<const HoldMotion> holds,
+                                     std::shared_ptr<const SpringMotions> springs) {
   ReplayEnvironment replay;
   replay.material = environment.materials[0];
   replay.gravity = environment.gravity;
   replay.loads = environment.loads;
   replay.holds = std::move(holds);
   replay.hold_count = static_cast<int>(environment.holds.size());
+  replay.springs = std::move(springs);
+  for (const Hold& hold : environment.holds)
+    replay.stiffness.insert(replay.stiffness.end(), hold.stiffness.begin(), hold.stiffness.end());
   replay.obstacles = environment.obstacles;
   replay.schedule = environment.schedule;
   replay.time = environment.state.time;

@@ -15,7 +15,11 @@ int steps_before_a_hold_changes(const Environment& environment, double time_step
 /// becomes that at their end, as update_holds has it; the rest of the state stays.
 HoldMotion motion_of_holds(Environment& environment, double time_step, int steps);
 
-/// An environment as the device takes it. It is to hold `holds`.
-ReplayEnvironment replay_environment(const Environment& environment, std::shared_ptr<const HoldMotion> holds);
+/// The springs of soft holds in the same steps; null where no hold is soft.
+std::shared_ptr<const SpringMotions> motion_of_springs(Environment environment, double time_step, int steps);
+
+/// An environment as the device takes it. It is to hold `holds` and `springs`.
+ReplayEnvironment replay_environment(const Environment& environment, std::shared_ptr<const HoldMotion> holds,
+                                     std::shared_ptr<const SpringMotions> springs = {});
 
 }  // namespace flash::sim::cuda

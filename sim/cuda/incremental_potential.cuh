@@ -4,6 +4,7 @@
 #include "sim/cuda/elastic_gradient.cuh"
 #include "sim/cuda/replay_numbers.h"
 #include "sim/cuda/rigid_turn.cuh"
+#include "sim/cuda/springs.cuh"
 #include "sim/cuda/vertex_records.cuh"
 
 namespace flash::sim::cuda {
@@ -24,6 +25,7 @@ struct StepProblem {
   ObstacleStep<double> obstacles;
   StepStart damped_since;
   ElasticEnergies at_start;
+  Springs springs;
 
   __device__ double mass(const SheetTables& tables, int i) const {
     return material->areal_density * tables.vertex_area[i];
@@ -56,7 +58,7 @@ struct Iterate {
   double friction;       ///< potential of friction at its own normal forces [J]
   double line_friction;  ///< at those of the iterate from which the line leads here [J]
   double residual;       ///< norm [N]
-  double rounding;       ///< of it, by that of positions where friction turns [N]
+  double rounding;       ///< of it, by that of positions where friction turns and springs stretch [N]
   double worst;  ///< largest residual of a vertex beyond its rounding, over its weight (least_weight.h)
 };
 
@@ -303,6 +305,41 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
   return {sums[potential], sums[friction], sums[line_friction], sums[residual], sums[rounding], worst};
 }
 
+/// What springs add to an iterate.
+struct SpringSums {
+  double potential;  ///< [J]
+  double rounding;   ///< of the residual, by that of positions, squared [N^2]
+  double worst;      ///< the largest rounding of a vertex over its mass [N/kg]
+};
+
+/// Adds what springs need against them to the forces.
+__device__ __noinline__ SpringSums pull_by_springs(const SheetTables& tables, const StepProblem& step,
+                                                   const Iterate& at, double* partial) {
+  constexpr double epsilon = 2.220446049250313e-16;
+  enum { potential, rounding, count };
+  double sums[count], worst = 0;
+  const Springs& springs = step.springs;
+  sum_over_team(springs.count, sums, partial, [&](int first, double(&added)[count]) {
+    if (!springs.is_first_of_vertex(first)) return;
+    const int i = springs.list[first].place;
+    const Triple x = triple(at.positions[i]);
+    Triple force{}, stiffness{};
+    for_springs_of_vertex(springs, first, [&](int k) {
+      force = force + springs.force(k, x);
+      stiffness = stiffness + springs.along_axes(k);
+      added[potential] += springs.energy(k, x);
+    });
+    at.force[3 * i] -= force.x;
+    at.force[3 * i + 1] -= force.y;
+    at.force[3 * i + 2] -= force.z;
+    const double uncertain = epsilon * norm(x) * norm(stiffness);
+    added[rounding] += uncertain * uncertain;
+    worst = worse_of(worst, uncertain / step.mass(tables, i));
+  });
+  worst = worst_over_team(worst, partial);
+  return {sums[potential], sums[rounding], worst};
+}
+
 /// Fills in an iterate from its positions. `line`: contacts of the iterate from which a line leads here, null
 /// without. `triangle_shares`: for what triangles give to the gradient. `ring`: as elastic_gradient has it.
 template <bool places_on_chip>
@@ -317,6 +354,8 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
   double damping = elastic.damping;
   if (step.damped_since.metrics != nullptr && tables.bundle_count > 0)
     damping += add_turned_damping(tables, step, memory, at.positions, at.force, partial);
+  SpringSums springs = {};
+  if (step.springs.count > 0) springs = pull_by_springs(tables, step, at, partial);
   const auto balance = [&](auto kind) {
     return balance_vertices<decltype(kind)>(tables, step, line, at, partial);
   };
@@ -324,18 +363,19 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
       step.obstacles.count == 0 ? balance(NoObstacles{}) : for_obstacles_of(step, balance);
   if (threadIdx.x == 0) {
     at.elastic = elastic;
-    at.potential = sums.potential + damping + elastic.membrane + elastic.bending;
+    at.potential = sums.potential + damping + elastic.membrane + elastic.bending + springs.potential;
     at.residual = sqrt(sums.residual);
     at.friction = sums.friction;
     at.line_friction = sums.line_friction;
-    at.rounding = sqrt(sums.rounding);
-    at.worst = sums.worst / step.material->weight_factor;
+    at.rounding = sqrt(sums.rounding + springs.rounding);
+    at.worst = (sums.worst - springs.worst) / step.material->weight_factor;
   }
   synchronize_team();
 }
 
 /// Whether |r| <= tolerance |M g|, and no vertex misses its weight by more than 30 times as much. The
-/// rounding of positions turns the friction of a vertex that starts to slide: that much more may be missing.
+/// rounding of positions turns the friction of a vertex that starts to slide, and stretches the springs of
+/// holds: that much more may be missing, of springs the most of them at each vertex.
 __device__ inline bool balanced(const StepProblem& step, const Iterate& at, double tolerance) {
   constexpr double vertex_tolerance = 30;
   return at.worst <= vertex_tolerance * tolerance &&

@@ -55,6 +55,12 @@ __device__ void write_parts(const Work& w, const StepProblem& step, bool positiv
                        [&](int vertex) { return triple(w.now.positions[vertex]); },
                        {w.memory.hinge_matrix, w.memory.hinge_products});
   if (step.obstacles.count > 0) write_own_blocks(tables, step, w.now, !positive, w.memory.own_blocks);
+  if (step.springs.count > 0) {
+    if (step.obstacles.count == 0)
+      for (int k = team_rank(); k < 9 * tables.size; k += team_size()) w.memory.own_blocks[k] = 0;
+    synchronize_team();
+    add_spring_stiffness(step.springs, w.memory.own_blocks);
+  }
   synchronize_team();
 }
 

@@ -1,6 +1,7 @@
 #include "sim/cuda/replay_checks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -13,6 +14,23 @@ namespace flash::sim::cuda {
 namespace {
 
 constexpr int most_halvings = 16;
+
+/// That each spring has a vertex, a hold and a stiffness.
+void check_springs(const ReplayEnvironment& environment, const ReplaySettings& settings, int vertices) {
+  if (environment.springs == nullptr) return;
+  require(std::ssize(*environment.springs) >= settings.steps - settings.first_step,
+          "springs have to be given for each step");
+  require(!settings.projective, "the projective method knows no springs");
+  const auto is_there = [](int number, std::ptrdiff_t count) { return number >= 0 && number < count; };
+  for (const std::vector<SpringMotion>& step : *environment.springs)
+    for (const SpringMotion& spring : step) {
+      require(is_there(spring.vertex, vertices) && is_there(spring.hold, environment.hold_count) &&
+                  is_there(spring.entry, std::ssize(environment.stiffness)),
+              "a spring's vertex, hold or stiffness");
+      const double stiffness = environment.stiffness[static_cast<std::size_t>(spring.entry)];
+      require(std::isfinite(stiffness) && stiffness >= 0, "a spring's stiffness has to be zero or more");
+    }
+}
 
 }  // namespace
 
@@ -44,6 +62,7 @@ void check_replay(const SheetPlan& plan, const std::vector<ReplayEnvironment>& e
     require(e.holds == nullptr || std::ssize(*e.holds) >= settings.steps - settings.first_step,
             "what is held has to be given for each step");
     require(e.hold_count == environments.front().hold_count, "all environments need as many holds");
+    check_springs(e, settings, size);
     require(e.obstacles.size() <= most_obstacles, "an environment may have 8 obstacles");
     for (const Obstacle& obstacle : e.obstacles)
       require(obstacle.frame == base_frame || (e.schedule != nullptr && obstacle.frame >= 0 &&

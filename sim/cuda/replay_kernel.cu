@@ -95,9 +95,13 @@ __device__ int advance(CommonState& common, int e, int first, int end) {
   for (int at = first; at < end; ++at) {
     const long row = static_cast<long>(material.motion) * replay.motion_steps + (at - replay.stats_begin);
     const int* starts = replay.hold_starts + row;
+    const int* spring_starts = replay.spring_starts + row;
     const StepMotion motion = {
         replay.holds + starts[0],
         starts[1] - starts[0],
+        replay.springs + spring_starts[0],
+        spring_starts[1] - spring_starts[0],
+        replay.stiffness + static_cast<long>(replay.stiffness_each) * e,
         replay.hold_forces +
             3L * replay.hold_count * (static_cast<long>(replay.stats_each) * e + at - replay.stats_begin),
         replay.obstacles + static_cast<long>(replay.most_obstacles_each) * e,
@@ -107,6 +111,11 @@ __device__ int advance(CommonState& common, int e, int first, int end) {
     change_common([&] {
       if (at == first) step.at_start = now.elastic;
       if (at % replay.restart_interval == 0) w.refactor = true;
+      // A factor does not know springs that come, nor that others have gone.
+      if (motion.spring_count != step.springs.count ||
+          (motion.spring_count > 0 && motion.held_count != step.held_count))
+        w.refactor = true;
+      step.springs = {};
       step.restrictions.count = step.held_count = motion.held_count;
     });
     const ReplayStats stats = advance_step(w, step, motion, state);

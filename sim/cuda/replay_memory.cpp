@@ -60,7 +60,8 @@ ReplayMemory::ReplayMemory(const SheetPlan& sheet, const std::vector<ReplayEnvir
       layout(lay_out(sheet, common_bending(sheet, environments), front_plan)),
       plan(front_plan, layout) {
   upload_state(environments);
-  const int most_held = upload_motions(sheet, environments);
+  const MostHeld most_held = upload_motions(sheet, environments);
+  upload_stiffness(environments);
   const int all_steps = settings.steps - settings.first_step;
   stats = DeviceArray<ReplayStats>(static_cast<std::size_t>(all_steps) * environments.size());
   upload_kept_steps();
@@ -70,7 +71,7 @@ ReplayMemory::ReplayMemory(const SheetPlan& sheet, const std::vector<ReplayEnvir
   upload_bristles(environments, most_obstacles_each);
   if (!settings.projective) {
     plan_stages();
-    lay_out_teams({plan.fronts, layout, damped, most_held, most_obstacles_each});
+    lay_out_teams({plan.fronts, layout, damped, most_held.springs, most_held.vertices, most_obstacles_each});
   }
   steps = DeviceArray<int>(environments.size());
   work = DeviceArray<int>(environments.size());
@@ -95,6 +96,9 @@ ReplayMemory::ReplayMemory(const SheetPlan& sheet, const std::vector<ReplayEnvir
   numbers.hold_starts = hold_starts.data();
   numbers.motion_steps = all_steps + 1;
   numbers.holds = holds.data();
+  numbers.spring_starts = spring_starts.data();
+  numbers.springs = springs.data();
+  numbers.stiffness = stiffness.data();
   numbers.obstacles = obstacles.data();
   numbers.most_obstacles_each = most_obstacles_each;
   numbers.poses = poses.data();
@@ -168,7 +172,8 @@ void ReplayMemory::upload_bristles(const std::vector<ReplayEnvironment>& environ
   bristles = DeviceArray<Point>(all);
 }
 
-int ReplayMemory::upload_motions(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments) {
+ReplayMemory::MostHeld ReplayMemory::upload_motions(const SheetPlan& sheet,
+                                                    const std::vector<ReplayEnvironment>& environments) {
   FlatMotions flat;
   for (const ReplayEnvironment& e : environments)
     if (e.schedule != nullptr)
@@ -184,7 +189,21 @@ int ReplayMemory::upload_motions(const SheetPlan& sheet, const std::vector<Repla
   materials = DeviceArray<ReplayMaterial>(all);
   hold_starts = DeviceArray<int>(flat.starts);
   holds = DeviceArray<HeldPlace>(flat.holds);
-  return flat.most;
+  spring_starts = DeviceArray<int>(flat.spring_starts);
+  springs = DeviceArray<SpringPlace>(flat.springs);
+  return {flat.most, !flat.springs.empty()};
+}
+
+void ReplayMemory::upload_stiffness(const std::vector<ReplayEnvironment>& environments) {
+  std::size_t most = 0;
+  for (const ReplayEnvironment& e : environments) most = std::max(most, e.stiffness.size());
+  std::vector<double> all;
+  for (const ReplayEnvironment& e : environments) {
+    all.insert(all.end(), e.stiffness.begin(), e.stiffness.end());
+    all.resize((static_cast<std::size_t>(&e - environments.data()) + 1) * most);
+  }
+  stiffness = DeviceArray<double>(all);
+  numbers.stiffness_each = static_cast<int>(most);
 }
 
 int ReplayMemory::upload_obstacles(const std::vector<ReplayEnvironment>& environments) {

@@ -32,6 +32,9 @@ struct ReplayMemory {
   DeviceArray<Point> positions, velocities, bristles, loads;
   DeviceArray<int> hold_starts, kept_index, order, steps, work, unfinished;
   DeviceArray<HeldPlace> holds;
+  DeviceArray<int> spring_starts;
+  DeviceArray<SpringPlace> springs;
+  DeviceArray<double> stiffness;
   DeviceArray<PlacedObstacle> obstacles;
   DeviceArray<FramePose> poses;
   DeviceArray<ReplayStats> stats;
@@ -65,8 +68,14 @@ struct ReplayMemory {
   /// Each environment has room for `most_obstacles_each`.
   void upload_bristles(const std::vector<ReplayEnvironment>& environments, int most_obstacles_each);
 
-  /// Returns how many vertices are held at once at most.
-  int upload_motions(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments);
+  /// What is held at once, at most.
+  struct MostHeld {
+    int vertices;
+    bool springs;  ///< whether there are any
+  };
+  MostHeld upload_motions(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments);
+
+  void upload_stiffness(const std::vector<ReplayEnvironment>& environments);
 
   /// Returns how many obstacles an environment has at most.
   int upload_obstacles(const std::vector<ReplayEnvironment>& environments);

@@ -56,6 +56,15 @@ struct HeldPlace {
   int holds[3];  ///< number of the hold that each axis obeys
 };
 
+/// A spring between a vertex and its place in a soft hold, which moves from one to another over a step.
+struct SpringPlace {
+  int place;
+  int axes;   ///< in which it acts: bits 1, 2 and 4
+  int hold;   ///< its number
+  int entry;  ///< of its stiffness
+  double from[3], to[3];
+};
+
 /// How one step of one environment went.
 struct ReplayStats {
   double residual;     ///< |r| / |M g|
@@ -86,7 +95,8 @@ struct TeamMemory {
   double* forces[3];       ///< what each vertex needs from outside [N]
   double* residuals[3];    ///< what the constraints leave of it [N]
   ContactSet contacts[4];  ///< of the iterates and of the linear problem; null without obstacles
-  float* own_blocks;       ///< what contact adds to the diagonal of the matrix, nine numbers a vertex
+  float* own_blocks;       ///< what contact and springs add to the diagonal of the matrix, nine numbers a
+                           ///< vertex; null without both
   int* held_axes;          ///< by place: bits 1, 2 and 4 for x, y and z
   CoupledMemory coupled;   ///< null without obstacles
   float *gradient, *direction, *change;
@@ -150,6 +160,10 @@ struct ReplayNumbers {
   const int* hold_starts;  ///< of each motion and step, in `holds`
   int motion_steps;        ///< steps of a motion, and one more, in `hold_starts`
   const HeldPlace* holds;
+  const int* spring_starts;    ///< as hold_starts, in `springs`
+  const SpringPlace* springs;  ///< of a step by their vertices
+  const double* stiffness;     ///< of springs: `stiffness_each` an environment [N/m]
+  int stiffness_each;
   const PlacedObstacle* obstacles;  ///< `most_obstacles_each` an environment; null without
   int most_obstacles_each;
   const FramePose* poses;  ///< of each motion and step, `frames` each

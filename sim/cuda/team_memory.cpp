@@ -44,11 +44,11 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
     for (ContactSet& contacts : m.contacts)
       contacts = {arena.take<int>(size), records.operator()<ContactRecord>(1),
                   records.operator()<TouchRecord>(obstacles), arena.take<double>(size)};
-    m.own_blocks = arena.take<float>(9 * size);
     m.projectors = arena.take<float>(6 * size);
     m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),
                  arena.take<float>(3 * size * most_directions), arena.take<double>(small_numbers)};
   }
+  if (sizes.most_obstacles > 0 || sizes.sprung) m.own_blocks = arena.take<float>(9 * size);
   m.hold_starts = arena.take<double>(3 * held);
   m.clocks = arena.take<long long>(replay_phases + 1);
   return m;

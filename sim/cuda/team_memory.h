@@ -9,7 +9,7 @@ namespace flash::sim::cuda {
 struct TeamSizes {
   const FrontTables& fronts;
   const SheetLayout& layout;
-  bool damped;
+  bool damped, sprung;
   int most_held, most_obstacles;
 };
 

@@ -74,6 +74,7 @@ bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
   add_slip_stiffness(w.now.contacts, w.values);
   add_layer_diagonal(layer_stiffness(problem, w.now), w.values);
   restrict_matrix(w.plan->pattern, w.now.contacts, w.values);
+  w.factored_springs = problem.potential.spring_stiffness();
   return w.matrix.factorize(w.values);
 }
 
@@ -207,7 +208,8 @@ void iterate_to_balance(const StepProblem& problem, int most_iterations, NewtonW
   while (report.iterations - first < most_iterations && !problem.balanced(w.now, tolerance)) {
     tolerance = w.settings.tolerance;
     ++report.iterations;
-    if (w.refactor) {
+    // A spring may be a thousand times as stiff as what the factor has in its place.
+    if (w.refactor || w.factored_springs != problem.potential.spring_stiffness()) {
       if (!factorize(problem, w)) return;
       ++report.factorizations;
     }

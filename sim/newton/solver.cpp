@@ -41,10 +41,11 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWo
   return elastic;
 }
 
-/// Where speeds take the vertices in a `share` of the step, and what holds carry all the same.
+/// Where speeds and springs take the vertices in a `share` of the step, and what holds carry all the same.
 void advance_freely(const StepProblem& problem, double share, Iterate& to) {
   const State& start = problem.contacts.environment.state;
   to.positions = start.positions + share * problem.contacts.time_step * start.velocities;
+  problem.potential.pull(share, to.positions);
   to.contacts = begin_step(problem.contacts, to.positions);
   project_to_feasible(problem.contacts, to.contacts, to.positions);
 }
@@ -175,14 +176,17 @@ void check_thickness(const Sheet& sheet, const PairSurface& surface, double thic
   }
 }
 
-/// Vertices that holds carry in all axes.
+/// Vertices that holds carry rigidly in all axes.
 std::vector<bool> carried_vertices(const Environment& environment) {
   Eigen::Array<bool, Eigen::Dynamic, 3> held(environment.state.positions.rows(), 3);
   held.setConstant(false);
-  for (std::size_t k = 0; k < environment.state.held.size(); ++k)
-    for (const int vertex : environment.state.held[k].vertices)
-      for (int axis = 0; axis < 3; ++axis)
-        held(vertex, axis) |= environment.holds[k].axes[static_cast<std::size_t>(axis)];
+  for (std::size_t k = 0; k < environment.state.held.size(); ++k) {
+    const Hold& hold = environment.holds[k];
+    const std::vector<int>& vertices = environment.state.held[k].vertices;
+    for (std::size_t v = 0; v < vertices.size(); ++v)
+      for (std::size_t axis = 0; axis < 3 && is_rigid(hold, v); ++axis)
+        held(vertices[v], static_cast<Eigen::Index>(axis)) |= hold.axes[axis];
+  }
   std::vector<bool> carried;
   for (Eigen::Index i = 0; i < held.rows(); ++i) carried.push_back(held.row(i).all());
   return carried;

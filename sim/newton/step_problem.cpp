@@ -67,9 +67,10 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
     double squared_rounding = 0;
     for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i) {
       const VertexConstraint* c = iterate.contacts.find(i);
-      const double rounding = c == nullptr ? 0
-                                           : std::numeric_limits<double>::epsilon() *
-                                                 iterate.positions.row(i).norm() * norm(c->slip_stiffness);
+      const double stiffness =
+          (c == nullptr ? 0 : norm(c->slip_stiffness)) + potential.spring_stiffness().row(i).norm();
+      const double rounding =
+          std::numeric_limits<double>::epsilon() * iterate.positions.row(i).norm() * stiffness;
       if (!(iterate.residual.row(i).norm() <=
             vertex_tolerance * tolerance * std::max(potential.mass()[i], least_mass) * gravity + rounding))
         return false;

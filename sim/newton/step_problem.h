@@ -45,8 +45,8 @@ struct StepProblem {
 
   /// Whether |r| <= tolerance |M g| for each body, and no vertex misses its weight by more than 30 times as
   /// much. A vertex of small cells counts as no lighter than a tenth of the mean: its weight is far below the
-  /// forces between cells. The rounding of positions turns the friction of a vertex that starts to slide:
-  /// that much more may be missing.
+  /// forces between cells. The rounding of positions turns the friction of a vertex that starts to slide, and
+  /// stretches the springs of holds: that much more may be missing.
   bool balanced(const Iterate& iterate, double tolerance) const;
 };
 

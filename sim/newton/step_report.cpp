@@ -34,6 +34,8 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
           vector3d(touch.normal_force * touch.normal + touch.friction);
     }
   }
+  for (const Spring& spring : problem.potential.springs())
+    report.hold_forces[spring.hold] += spring.force(end.positions.row(spring.vertex));
   for (int i = 0; i < end.positions.rows(); ++i) {
     const VertexConstraint* c = end.contacts.find(i);
     // One that is held in some axes meets no obstacle in the others: such a step is not solved.
@@ -99,6 +101,9 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
       report.work += touch.starts_inside ? std::max(0.0, dot(force, way)) : dot(force, touch.surface_moved);
     }
   }
+  // Springs are no part of the sheet: what they store and give back is work that is done on it.
+  for (const Spring& spring : problem.potential.springs())
+    report.work += spring.force(end.positions.row(spring.vertex)).dot(moved.row(spring.vertex));
   if (problem.layers) bristles += problem.layers->bristle_energy(end.layers);
   for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));
   for (const MovingObstacle<double>& obstacle : problem.contacts.obstacles)

@@ -9,6 +9,7 @@
 #include <map>
 #include <utility>
 
+#include "data/error.h"
 #include "sim/oracle/anderson.h"
 #include "sim/oracle/projective_contact.h"
 #include "sim/step/feasible_positions.h"
@@ -147,6 +148,9 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   Workspace& w = *workspace_;
   const ProjectiveSettings& settings = w.settings;
   const double h = settings.time_step, time = environment.state.time + h;
+  if (const Hold* soft = first_soft_hold(environment))
+    throw data::input_error("hold " + soft->name, "stiffness",
+                            "the projective method knows rigid holds alone; use Newton's");
   const std::vector<BodyLaw> laws = body_laws(*w.plan, environment);
   ProjectiveSystem& system = w.system_of(environment.materials);
   update_holds(environment, time);

@@ -43,6 +43,7 @@ std::vector<int> vertices_in_reach(const Hold& hold, const State& state, const I
 
 HeldVertices take(const Hold& hold, const State& state, const Isometry3d& frame, double time) {
   const Isometry3d frame_from_base = frame.inverse();
+  check_stiffness(hold);
   HeldVertices held;
   held.vertices = hold.reach ? vertices_in_reach(hold, state, frame_from_base) : hold.vertices;
   held.offsets.resize(static_cast<Eigen::Index>(held.vertices.size()), 3);

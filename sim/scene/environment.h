@@ -133,7 +133,8 @@ Eigen::Isometry3d frame_pose(const Environment& environment, int frame, double t
 /// Closes and opens the holds for the step that ends at `time` [s]: a hold acts in the steps whose middle
 /// lies between its `from` and `to`, so that one that follows another leaves no step out. One that closes
 /// stores in environment.state.held which vertices it takes and where they are in its frame; one that opens
-/// forgets them. Throws data::InputError where a reach has no vertex in it, with the distance of the nearest.
+/// forgets them. Throws data::InputError where a reach has no vertex in it, with the distance of the nearest,
+/// and as check_stiffness does.
 void update_holds(Environment& environment, double time);
 
 /// Whether nothing is still to come: every hold has closed, has its vertices at their targets and does not

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "data/error.h"
+#include "data/text.h"
+
 namespace flash::sim {
 
 using data::Points;
@@ -12,6 +15,23 @@ data::Points held_places(const Hold& hold, const HeldVertices& held, double time
   const double share = hold.closing == Closing::smooth ? gone * gone * (3 - 2 * gone) : gone;
   if (hold.at_origin) return (1 - share) * held.offsets;
   return (1 - share) * held.offsets + share * hold.targets;
+}
+
+void check_stiffness(const Hold& hold) {
+  const Eigen::VectorXd& stiffness = hold.stiffness;
+  if (stiffness.size() == 0) return;
+  const auto refuse = [&](const std::string& why) {
+    throw data::input_error("hold " + hold.name, "stiffness", why);
+  };
+  if (hold.reach) refuse("found a reach beside it, expected vertices");
+  if (hold.axes != std::array{true, true, true}) refuse("found axes that are not held, expected all of them");
+  if (stiffness.size() != std::ssize(hold.vertices))
+    refuse("found " + std::to_string(stiffness.size()) + " numbers, expected one a vertex, " +
+           std::to_string(hold.vertices.size()));
+  for (Eigen::Index v = 0; v < stiffness.size(); ++v)
+    if (!(stiffness[v] >= 0))
+      refuse("found " + data::format_short(stiffness[v]) + " N/m at vertex " +
+             std::to_string(hold.vertices[static_cast<std::size_t>(v)]) + ", expected zero or more");
 }
 
 }  // namespace flash::sim

@@ -1,6 +1,8 @@
 #pragma once
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
@@ -29,7 +31,7 @@ enum class Closing {
 
 /// Vertices that something outside carries: a gripper, a support, a prescribed motion. It carries them in the
 /// steps whose middle lies between `from` and `to`. A vertex that several holds take obeys the last of them
-/// in each axis.
+/// in each axis. One that springs hold is pulled by them along the axes that no hold carries rigidly.
 struct Hold {
   std::string name = {};           ///< under which the force is told
   std::vector<int> vertices = {};  ///< empty with a reach, which takes them when the hold closes
@@ -42,7 +44,18 @@ struct Hold {
   double closing_time = 0.0;  ///< in which the vertices go to their targets, at least one step [s]
   Closing closing = Closing::smooth;
   std::optional<Reach> reach = {};
+  /// Of springs between the vertices and their places [N/m], one a vertex, infinite: rigid. Empty: all rigid.
+  Eigen::VectorXd stiffness = {};
 };
+
+/// Whether a hold carries the vertex `v` of those that it takes rigidly.
+inline bool is_rigid(const Hold& hold, std::size_t v) {
+  return hold.stiffness.size() == 0 || std::isinf(hold.stiffness[static_cast<Eigen::Index>(v)]);
+}
+
+/// Throws data::InputError where a hold with a stiffness does not have one, zero or more, for each of its
+/// vertices, does not hold all axes, or has a reach.
+void check_stiffness(const Hold& hold);
 
 /// What a hold has taken; no vertices: it is open.
 struct HeldVertices {

@@ -76,6 +76,7 @@ ContactSet begin_step(const ContactStep& step, Points& positions) {
     const Eigen::Isometry3d frame = frame_pose(environment, hold.frame, step.time);
     const Points places = held_places(hold, held, step.time);
     for (size_t v = 0; v < held.vertices.size(); ++v) {
+      if (!is_rigid(hold, v)) continue;
       const int vertex = held.vertices[v];
       const Vector3d place = frame * places.row(v).transpose();
       VertexConstraint& constraint = constraint_of_held(vertex);

@@ -96,7 +96,7 @@ struct ContactSet {
   }
 };
 
-/// The vertices that the environment's holds carry; moves them to where they have to be at the end of the
+/// The vertices that the environment's holds carry rigidly; moves them to where they have to be at the end of the
 /// step.
 ContactSet begin_step(const ContactStep& step, data::Points& positions);
 

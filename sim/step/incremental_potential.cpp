@@ -15,7 +15,12 @@ using Eigen::Vector3d;
 
 IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const std::vector<BodyLaw>& laws,
                                            const Environment& environment, double time_step)
-    : plan_(plan), laws_(laws), environment_(environment), h_(time_step), mass_(plan.sheet.vertex_area) {
+    : plan_(plan),
+      laws_(laws),
+      environment_(environment),
+      h_(time_step),
+      mass_(plan.sheet.vertex_area),
+      springs_(springs_of(environment, environment.state.time + time_step)) {
   const State& start = environment.state;
   for (const BodyLaw& law : laws)
     if (law.solid != nullptr)
@@ -27,6 +32,9 @@ IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const std::vec
   target_.rowwise() += h_ * h_ * environment.gravity.transpose();
   loads_ = Points::Zero(start.positions.rows(), 3);
   for (const Load& load : environment.loads) loads_.row(load.vertex) += load.force.transpose();
+  spring_stiffness_ = Points::Zero(start.positions.rows(), 3);
+  for (const Spring& spring : springs_)
+    spring_stiffness_.row(spring.vertex) += spring.stiffness * spring.acts.matrix().transpose();
   const auto damped = [](const BodyLaw& law) { return law.stiffness_damping() > 0; };
   if (std::none_of(laws.begin(), laws.end(), damped)) return;
   start_metrics_ = triangle_metrics(plan, start.positions);
@@ -59,13 +67,35 @@ double IncrementalPotential::evaluate(const Points& positions, Points& force, El
     if (law.stiffness_damping() > 0) potential += add_damping(law, positions, force);
     elastic += add_elastic_gradient(plan_, law, positions, force);
   }
+  for (const Spring& spring : springs_) {
+    const Vector3d x = positions.row(spring.vertex);
+    force.row(spring.vertex) -= spring.force(x).transpose();
+    potential += spring.energy(x);
+  }
   return potential + elastic.membrane + elastic.bending + elastic.solid;
 }
 
 double IncrementalPotential::at_start(const ElasticEnergy& elastic) const {
-  const Points inertial = environment_.state.positions - target_;
+  const Points& start = environment_.state.positions;
+  const Points inertial = start - target_;
+  double springs = 0;
+  for (const Spring& spring : springs_) springs += spring.energy(start.row(spring.vertex));
   return 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() + elastic.membrane +
-         elastic.bending + elastic.solid + elastic.layers;
+         elastic.bending + elastic.solid + elastic.layers + springs;
+}
+
+void IncrementalPotential::pull(double share, Points& positions) const {
+  if (springs_.empty()) return;
+  const Points& start = environment_.state.positions;
+  Points weight = (mass_ / (h_ * h_)).replicate(1, 3);
+  for (const Spring& spring : springs_)
+    for (int axis = 0; axis < 3; ++axis) {
+      const double own = spring.stiffness * spring.acts[axis];
+      const double place = start(spring.vertex, axis) + share * (spring.place[axis] - spring.before[axis]);
+      double& whole = weight(spring.vertex, axis);
+      whole += own;
+      positions(spring.vertex, axis) += own / whole * (place - positions(spring.vertex, axis));
+    }
 }
 
 double IncrementalPotential::add_drag(const BodyLaw& law, const Points& moved, Points& force) const {
@@ -120,7 +150,7 @@ void IncrementalPotential::assemble(const Points& positions, Curvature curvature
     const double per_mass = 1 / (h_ * h_) + law.air_drag() / h_;
     const Body& body = law.place.body;
     for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i)
-      for (int c = 0; c < 3; ++c) values[9L * i + 4 * c] += mass_[i] * per_mass;
+      for (int c = 0; c < 3; ++c) values[9L * i + 4 * c] += mass_[i] * per_mass + spring_stiffness_(i, c);
   }
 }
 

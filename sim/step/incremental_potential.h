@@ -7,18 +7,21 @@
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 #include "sim/step/elastic_energy.h"
+#include "sim/step/springs.h"
 
 namespace flash::sim {
 
-/// What one implicit Euler step of length h from `environment.state` minimizes, contact and holds apart:
+/// What one implicit Euler step of length h from `environment.state` minimizes, contact and rigid holds
+/// apart:
 ///
-///   |x - s|^2_M / (2 h^2) + E(x) - f.x + a / (2 h) |x - x_0|^2_M + b / h E_0(x),   s = x_0 + h v_0 + h^2 g
+///   |x - s|^2_M / (2 h^2) + E(x) - f.x + a / (2 h) |x - x_0|^2_M + b / h E_0(x) + |x - p|^2_K / 2
+///   s = x_0 + h v_0 + h^2 g
 ///
-/// with the elastic energy E, loads f, `air_drag` a and `stiffness_damping` b of each body. E_0 is the
-/// elastic energy of what changed since the start of the step: strains, angles of hinges, and positions of a
-/// quadratic bending model, less the rotation of the body as a whole. Its forces are b K v for small motions
-/// (Kelvin-Voigt). A sheet that turns rigidly feels no torque from them, stressed or not. The arguments of
-/// the constructor have to outlive the potential.
+/// with the elastic energy E, loads f, the springs K of soft holds to their places p (springs_of), `air_drag`
+/// a and `stiffness_damping` b of each body. E_0 is the elastic energy of what changed since the start of the
+/// step: strains, angles of hinges, and positions of a quadratic bending model, less the rotation of the body
+/// as a whole. Its forces are b K v for small motions (Kelvin-Voigt). A sheet that turns rigidly feels no
+/// torque from them, stressed or not. The arguments of the constructor have to outlive the potential.
 class IncrementalPotential {
  public:
   IncrementalPotential(const SheetPlan& plan, const std::vector<BodyLaw>& laws,
@@ -39,6 +42,16 @@ class IncrementalPotential {
   /// blocks over edges are filled, which are all where no hinges bend.
   void assemble(const data::Points& positions, Curvature curvature, bool sparse,
                 BlockValues<double>& values) const;
+
+  const std::vector<Spring>& springs() const { return springs_; }
+
+  /// What springs add to the diagonal of the Hessian: vertices x axes [N/m].
+  const data::Points& spring_stiffness() const { return spring_stiffness_; }
+
+  /// Takes vertices that springs hold from where speeds take them in a `share` of the step to where inertia
+  /// and springs balance, given that all was in balance at its start: x <- (m / h^2 x + k q) / (m / h^2 + k).
+  /// q goes with the spring's place, from where the vertex was.
+  void pull(double share, data::Points& positions) const;
 
   /// What the stiffness of a body's quadratic bending model enters the Hessian with: D (1 + b / h) [N m].
   double effective_rigidity(const BodyLaw& law) const;
@@ -64,6 +77,8 @@ class IncrementalPotential {
   double h_;
   Eigen::VectorXd mass_;
   data::Points target_, loads_;
+  std::vector<Spring> springs_;
+  data::Points spring_stiffness_;
   // Strains and angles of all bodies at the start of the step; kept where any of them is damped.
   std::vector<Eigen::Matrix2d> start_metrics_;
   std::vector<Eigen::Matrix3d> solid_start_metrics_;

@@ -47,8 +47,8 @@ struct Parameter {
 };
 
 /// young, poisson, bending, bending_ratio, young_ratio, shear_ratio, yield_curvature, friction,
-/// areal_density, density, air_drag, stiffness_damping; start_yaw, table_height, grasp_depth,
-/// grasp_direction, grasp_pitch.
+/// areal_density, density, air_drag, stiffness_damping; start_yaw, table_height, grasp_size,
+/// grasp_stiffness, grasp_depth, grasp_direction, grasp_pitch.
 const std::vector<Parameter>& known_parameters();
 
 /// Null where none has that name.

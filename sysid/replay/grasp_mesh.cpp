@@ -196,7 +196,7 @@ void refine_grasps(const ReplaySettings& settings, double part, data::Recording&
 }
 
 bool has_grasp_size(const data::RecordedGrasp& grasp, const ReplaySettings& settings) {
-  return grasp.select.corner && shape_of(grasp, settings) != data::GraspShape::point;
+  return grasp.select.corner && shape_of(grasp, settings) == data::GraspShape::clamp;
 }
 
 std::optional<double> grasp_size(const data::Recording& recording, const ReplaySettings& settings) {
@@ -227,7 +227,7 @@ void resize_grasps(double size, ReplaySettings& settings, data::Recording& recor
         rest(i, axis) = corner.place[axis] + moved * corner.inwards[axis];
       }
     }
-    (shape_of(grasp, settings) == data::GraspShape::pinch ? grasp.depth : grasp.select.within) = size;
+    grasp.select.within = size;
   }
   if (settings.grasp_within) settings.grasp_within = size;
   recording.start = (rest * recording.base_from_object.linear().transpose()).rowwise() +

@@ -36,7 +36,7 @@ void halve_cells(data::Recording& recording);
 /// A part of the size of the cells at the grasps, nested in them: those elsewhere stay.
 void refine_grasps(const ReplaySettings& settings, double part, data::Recording& recording);
 
-/// Whether the size of a grasp can be varied: that of a patch at a corner of a sheet, clamped or pinched.
+/// Whether the size of a grasp can be varied: that of a clamped patch at a corner of a sheet.
 bool has_grasp_size(const data::RecordedGrasp& grasp, const ReplaySettings& settings);
 
 /// The size of the first patch that has_grasp_size, as the settings have it [m]; empty where none has.

@@ -129,6 +129,7 @@ std::string key_of(const Replay& replay, const ReplayCandidate& candidate, const
     for (const int vertex : hold.vertices) bytes.add(vertex);
     for (const double value : {hold.from, hold.to, hold.closing_time}) bytes.add(value);
     bytes.add_matrix(hold.targets);
+    if (hold.stiffness.size() > 0) bytes.add_matrix(hold.stiffness);
     if (hold.frame == sim::base_frame) continue;
     for (const Eigen::Isometry3d& pose : world.schedule->frames[static_cast<std::size_t>(hold.frame)])
       bytes.add_matrix(pose.matrix());
@@ -213,7 +214,7 @@ std::optional<ReplayResult> load(const Replay& replay, const std::vector<int>& k
 }  // namespace
 
 std::string motion_key(const Replay& replay, const ReplayCandidate& candidate) {
-  return key_of(replay, make_environment(replay, candidate), scored_steps(replay));
+  return key_of(replay, candidate, scored_steps(replay));
 }
 
 MotionStore::MotionStore(const std::string& folder) : folder_(folder) {

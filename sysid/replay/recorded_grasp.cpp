@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "data/error.h"
 #include "data/text.h"
@@ -22,6 +24,39 @@ Eigen::RowVector3d corner_of(const data::TriangleMesh& mesh, const std::array<in
   return position;
 }
 
+/// The vertex of a patch that a grasp in a point would hold.
+int nearest_to_point(const Replay& replay, const data::RecordedGrasp& grasp, const std::vector<int>& patch) {
+  const data::Points& rest = replay.recording.mesh.vertices;
+  Eigen::RowVector3d held = rest.row(patch.front());
+  if (grasp.select.corner) {
+    held = corner_of(replay.recording.mesh, *grasp.select.corner);
+  } else if (grasp.select.position) {
+    const Eigen::Isometry3d gripper = data::pose_at(trajectory_of(replay.recording, grasp), grasp.from);
+    held = (replay.recording.base_from_object.inverse() * (gripper * *grasp.select.position)).transpose();
+  }
+  return *std::min_element(patch.begin(), patch.end(), [&](int i, int j) {
+    return (rest.row(i) - held).squaredNorm() < (rest.row(j) - held).squaredNorm();
+  });
+}
+
+/// Springs between the vertices of a patch and pads that give way, a Winkler foundation of `modulus` [N/m^3]
+/// under the triangles inside the patch. The vertex that a grasp in a point would hold is held rigidly: so the
+/// softest pads are a point, and the stiffest a clamp.
+Eigen::VectorXd pad_stiffness(const Replay& replay, const data::RecordedGrasp& grasp, double modulus,
+                              const std::vector<int>& patch) {
+  std::map<int, double> area;  // of the pads [m^2]
+  for (const int vertex : patch) area[vertex] = 0;
+  for (const sim::RestTriangle& triangle : replay.sheet().triangles)
+    if (std::all_of(triangle.vertices.begin(), triangle.vertices.end(),
+                    [&](int vertex) { return area.contains(vertex); }))
+      for (const int vertex : triangle.vertices) area[vertex] += triangle.area / 3;
+  area[nearest_to_point(replay, grasp, patch)] = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd stiffness(static_cast<Eigen::Index>(patch.size()));
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    stiffness[static_cast<Eigen::Index>(i)] = modulus * area[patch[i]];
+  return stiffness;
+}
+
 /// The patch a grasp of this shape takes.
 std::vector<int> patch_of(const Replay& replay, const data::RecordedGrasp& recorded,
                           const ReplayNuisance& nuisance) {
@@ -32,18 +67,7 @@ std::vector<int> patch_of(const Replay& replay, const data::RecordedGrasp& recor
   std::vector<int> patch = data::select_vertices(replay.recording, grasp);
   if (shape != data::GraspShape::point)
     return replay.recording.is_solid() ? sim::with_midsides(replay.sheet(), patch) : patch;
-  const data::Points& rest = replay.recording.mesh.vertices;
-  Eigen::RowVector3d held = rest.row(patch.front());
-  if (grasp.select.corner) {
-    held = corner_of(replay.recording.mesh, *grasp.select.corner);
-  } else if (grasp.select.position) {
-    const Eigen::Isometry3d gripper = data::pose_at(trajectory_of(replay.recording, grasp), grasp.from);
-    held = (replay.recording.base_from_object.inverse() * (gripper * *grasp.select.position)).transpose();
-  }
-  const auto nearer = [&](int i, int j) {
-    return (rest.row(i) - held).squaredNorm() < (rest.row(j) - held).squaredNorm();
-  };
-  return {*std::min_element(patch.begin(), patch.end(), nearer)};
+  return {nearest_to_point(replay, grasp, patch)};
 }
 
 }  // namespace
@@ -117,7 +141,10 @@ sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, i
   const double available = from_beginning ? replay.beginning - replay.start : replay.settings.closing_time;
   hold.closing_time = std::min(replay.settings.closing_time, available);
 
-  const bool pinched = shape_of(recorded, replay.settings) == data::GraspShape::pinch;
+  const data::GraspShape shape = shape_of(recorded, replay.settings);
+  const bool pinched = shape == data::GraspShape::pinch;
+  if (shape == data::GraspShape::clamp && nuisance.grasp_stiffness)
+    hold.stiffness = pad_stiffness(replay, recorded, *nuisance.grasp_stiffness, hold.vertices);
   if (!from_beginning || (!pinched && nuisance.table_height == 0)) return hold;
   data::Points targets = flat(hold.vertices, Eigen::all);
   if (pinched) {

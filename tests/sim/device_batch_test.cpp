@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+#include <utility>
+
 #include "data/error.h"
 #include "tests/sim/sheet_scene.h"
 
@@ -43,6 +47,36 @@ std::vector<Environment> lifts(const SheetPlan& plan, int count) {
   return all;
 }
 
+/// The same lift by pads: springs of other stiffness in each environment, one of them rigid and one without
+/// force. The corner is let go from springs, which share a vertex with others.
+Environment soft_lift(const SheetPlan& plan, int which) {
+  Environment environment = lift(plan, which);
+  Hold& grasp = environment.holds[0];
+  grasp.vertices = {0, 1, 2, 9, 10};
+  grasp.stiffness = std::pow(10.0, which % 4) * Eigen::Matrix<double, 5, 1>{20, 10, 0, 40, 5};
+  if (which % 2 == 0) grasp.stiffness[1] = std::numeric_limits<double>::infinity();
+  Hold& corner = environment.holds[1];
+  corner.vertices = {80, 79, 71};
+  corner.stiffness = Eigen::Vector3d(30, 30, 60);
+  Hold edge{.vertices = {80, 72}, .axes = {false, false, true}};
+  edge.targets = data::Points::Zero(2, 3);
+  for (int v = 0; v < 2; ++v) edge.targets.row(v) = plan.sheet.rest.vertices.row(edge.vertices[v]);
+  edge.to = 0.1;
+  Hold second = corner;
+  second.stiffness *= 0.5;
+  environment.holds.push_back(edge);
+  environment.holds.push_back(second);
+  if (which % 3 == 0) environment.obstacles.clear();
+  if (which % 4 == 3) environment.materials[0].stiffness_damping = 0.02;
+  return environment;
+}
+
+std::vector<Environment> soft_lifts(const SheetPlan& plan, int count) {
+  std::vector<Environment> all;
+  for (int e = 0; e < count; ++e) all.push_back(soft_lift(plan, e));
+  return all;
+}
+
 BatchSettings settings_on(Device device) {
   BatchSettings settings;
   settings.steps = steps;
@@ -61,10 +95,9 @@ Batch run(const std::shared_ptr<const SheetPlan>& plan, const std::vector<Enviro
   return batch;
 }
 
-TEST(DeviceBatch, IsThatOfTheProcessor) {
-  SKIP_WITHOUT_DEVICE();
-  const auto plan = sheet();
-  const auto environments = lifts(*plan, 6);
+/// Simulates them on both. At least so many have to be comparable.
+void expect_as_on_the_processor(const std::shared_ptr<const SheetPlan>& plan,
+                                const std::vector<Environment>& environments, int least) {
   const Batch device = run(plan, environments, settings_on(Device::cuda)),
               cpu = run(plan, environments, settings_on(Device::cpu));
   // The residual of 1e-5 of the weight moves a vertex by 1e-5 h^2 g in a step; folds amplify it.
@@ -86,21 +119,71 @@ TEST(DeviceBatch, IsThatOfTheProcessor) {
     EXPECT_LE((own.positions - expected.positions).cwiseAbs().maxCoeff(), near);
     EXPECT_LE((own.velocities - expected.velocities).cwiseAbs().maxCoeff(), near / 0.01);
     EXPECT_NEAR(own.time, expected.time, 1e-12);
-    ASSERT_EQ(own.held.size(), 2u);
-    EXPECT_EQ(own.held[0].vertices, expected.held[0].vertices);
+    ASSERT_EQ(own.held.size(), expected.held.size());
+    for (std::size_t k = 0; k < own.held.size(); ++k)
+      EXPECT_EQ(own.held[k].vertices, expected.held[k].vertices);
     EXPECT_TRUE(own.held[1].vertices.empty());
-    constexpr std::ptrdiff_t forces_each = steps * 2 * 3;
+    const std::ptrdiff_t forces_each = steps * std::ssize(own.held) * 3;
     const View<double> forces = device.hold_forces(), cpu_forces = cpu.hold_forces();
     for (std::ptrdiff_t k = e * forces_each; k < (e + 1) * forces_each; ++k)
       EXPECT_NEAR(forces.data[k], cpu_forces.data[k], 1e-4 + 1e-3 * std::abs(cpu_forces.data[k]));
   }
-  EXPECT_GE(compared, 4);
+  EXPECT_GE(compared, least);
+}
+
+TEST(DeviceBatch, IsThatOfTheProcessor) {
+  SKIP_WITHOUT_DEVICE();
+  const auto plan = sheet();
+  expect_as_on_the_processor(plan, lifts(*plan, 6), 4);
+}
+
+TEST(DeviceBatch, SoftHoldsAreThoseOfTheProcessor) {
+  SKIP_WITHOUT_DEVICE();
+  const auto plan = sheet();
+  expect_as_on_the_processor(plan, soft_lifts(*plan, 8), 5);
+}
+
+TEST(DeviceBatch, SoftHoldsTakeAsManyIterationsAsRigidOnes) {
+  SKIP_WITHOUT_DEVICE();
+  const auto plan = sheet();
+  BatchSettings settings = settings_on(Device::cuda);
+  settings.solver = {};
+  std::vector<Environment> environments;
+  for (const double modulus : {0.0, 1e6, 1e8, 1e10, 1e11}) {
+    environments.push_back(lift(*plan, 0));
+    if (modulus == 0) continue;
+    Hold& grasp = environments.back().holds[0];
+    grasp.stiffness.resize(std::ssize(grasp.vertices));
+    for (std::size_t v = 0; v < grasp.vertices.size(); ++v)
+      grasp.stiffness[static_cast<Eigen::Index>(v)] = modulus * plan->sheet.vertex_area[grasp.vertices[v]];
+  }
+  const Batch batch = run(plan, environments, settings);
+  const auto work_of = [&](int e) {
+    std::pair<int, int> sums;
+    for (const StepStats& step : batch.stats(e)) {
+      EXPECT_TRUE(step.converged) << e;
+      sums.first += step.iterations;
+      sums.second += step.solves;
+    }
+    return sums;
+  };
+  const auto [iterations, solves] = work_of(0);
+  for (int e = 1; e < batch.size(); ++e) {
+    const auto [own, own_solves] = work_of(e);
+    EXPECT_LE(own, 1.2 * iterations) << e;
+    EXPECT_LE(own_solves, 1.3 * solves) << e;
+  }
 }
 
 TEST(DeviceBatch, EqualsItsEnvironmentsAloneBitForBit) {
   SKIP_WITHOUT_DEVICE();
   const auto plan = sheet();
-  const auto environments = lifts(*plan, 7);
+  auto environments = soft_lifts(*plan, 6);
+  // All have as many holds.
+  for (int e = 0; e < 7; ++e) {
+    environments.push_back(lift(*plan, e));
+    environments.back().holds.resize(4, {.vertices = {40}, .from = 100});
+  }
   const Batch together = run(plan, environments, settings_on(Device::cuda));
   for (int e = 0; e < together.size(); ++e) {
     const Batch alone = run(plan, {environments[static_cast<std::size_t>(e)]}, settings_on(Device::cuda));
@@ -187,6 +270,15 @@ TEST(DeviceBatch, WhatTheDeviceCannotDoIsRefusedByName) {
     FAIL() << "it has to be refused";
   } catch (const data::InputError& error) {
     EXPECT_NE(std::string(error.what()).find("(contacts) are told on the CPU alone"), std::string::npos);
+  }
+  BatchSettings projective = settings_on(Device::cuda);
+  projective.projective = ProjectiveSettings{.acceleration = 0, .metric = ContactMetric::inertia};
+  Batch pads(plan, {soft_lift(*plan, 0)}, projective);
+  try {
+    pads.advance(1);
+    FAIL() << "it has to be refused";
+  } catch (const data::InputError& error) {
+    EXPECT_STREQ(error.what(), "--device cuda: the projective method knows rigid holds alone; use Newton's");
   }
   environment.obstacles.clear();
   environment.state.positions = data::Points::Zero(65537, 3);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "sim/cuda/batch_system.h"
@@ -415,6 +416,21 @@ TEST(BatchReplay, WhatDoesNotFitIsRefused) {
     const HeldVertex held{1, {true, true, true}, Vector3d::Zero()};
     e.holds = std::make_shared<HoldMotion>(3, std::vector<HeldVertex>{held, held});
   });
+  const auto with_spring = [](SpringMotion spring, double stiffness, std::size_t steps = 3) {
+    return [=](ReplayEnvironment& e) {
+      e.springs = std::make_shared<SpringMotions>(steps, std::vector<SpringMotion>{spring});
+      e.stiffness = {stiffness};
+    };
+  };
+  const SpringMotion spring{1, 0, 0, {true, true, true}, Vector3d::Zero(), Vector3d::Zero()};
+  refused(with_spring(spring, -1));
+  refused(with_spring(spring, std::numeric_limits<double>::infinity()));
+  refused(with_spring(spring, 10, 2));
+  for (int SpringMotion::*number : {&SpringMotion::vertex, &SpringMotion::hold, &SpringMotion::entry}) {
+    SpringMotion other = spring;
+    other.*number = 100000;
+    refused(with_spring(other, 10));
+  }
   EXPECT_THROW(BatchReplay(scene.plan, {}, settings_of(3, 1e-3)), std::invalid_argument);
 }
 
