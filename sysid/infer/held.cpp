@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/recorded_grasp.h"
 
 namespace flash::sysid {
@@ -10,6 +11,10 @@ namespace {
 
 constexpr double kFriction = 2, kStiffness = 2, kWeight = 1.1;  // factors within which each is known
 constexpr double kPinch = 0.2;  // angles of the ridge that two fingers fold [rad]
+constexpr double kPatch = 0.003;  // where fingers end on a sheet [m]
+/// Pads that give way by some millimetres under a sheet, as soft silicone does, and such as hardly do: these
+/// are a standard deviation apart, and one to the other side is harder still [N/m^3].
+constexpr double kSoftPads = 1e8, kHardPads = 1e12;
 
 bool is_searched(const std::string& name, const GridSettings& grid) {
   return std::any_of(grid.axes.begin(), grid.axes.end(),
@@ -43,6 +48,17 @@ const data::RecordedGrasp* pinch_of(const std::vector<Replay>& replays) {
       if (grasp.from <= replay.beginning && shape_of(grasp, replay.settings) == data::GraspShape::pinch)
         return &grasp;
   return nullptr;
+}
+
+/// The size that all clamped patches at corners have; empty where they differ, or there are none.
+std::optional<double> common_grasp_size(const std::vector<Replay>& replays) {
+  std::optional<double> common;
+  for (const Replay& replay : replays) {
+    const std::optional<double> size = grasp_size(replay.recording, replay.settings);
+    if (!size || (common && std::abs(*common - *size) > 1e-9)) return std::nullopt;
+    common = size;
+  }
+  return common;
 }
 
 }  // namespace
@@ -95,6 +111,13 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
   if (const data::RecordedGrasp* const pinch = pinch_of(replays)) {
     if (pinch->direction.isZero()) add_angle("grasp_direction", 0);
     add_angle("grasp_pitch", pinch->pitch);
+  }
+  if (const std::optional<double> size = common_grasp_size(replays)) {
+    const double at_size = candidate.nuisance.grasp_size.value_or(*size);
+    if (!is_stated("grasp_size", grid))
+      held.push_back({"grasp_size", at_size, within(at_size, kPatch, 0), false});
+    if (!is_stated("grasp_stiffness", grid) && !candidate.nuisance.grasp_stiffness)
+      held.push_back({"grasp_stiffness", kHardPads, {kSoftPads, kHardPads}, false});
   }
   add_bound("start_yaw", yaw);
   add_bound("table_height", height);

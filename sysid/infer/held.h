@@ -23,8 +23,9 @@ struct HeldParameter {
 /// of a sheet of which the other is searched: a soft sheet is moved by both. The weight within 10 %:
 /// stiffnesses are known as ratios to it. The bounds of a recording on start yaw and table height, over
 /// sqrt(3), where it has any. Of a pinch its pitch, and its direction where the recording does not give one,
-/// within 0.2 rad: fingers fold what they find. The other properties of the asset, shape and size of the
-/// grasp and what was fixed count as known.
+/// within 0.2 rad: fingers fold what they find. The other properties of the asset, the shape
+/// of the grasp and what was fixed count as known. Of a clamped patch at a corner the size is known within
+/// 3 mm, and its pads may give way, as soft ones do, or hardly.
 /// `at`: values of the axes, for what follows these (bending of a plate of which young is searched).
 std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays,
                                            const std::vector<double>& at);
