@@ -14,6 +14,7 @@
 #include "sim/scene/sheet.h"
 #include "sim/scene/solid.h"
 #include "sysid/report/export_asset.h"
+#include "sysid/report/next_steps.h"
 #include "sysid/report/search_folder.h"
 
 namespace flash {
@@ -49,11 +50,13 @@ int run_export(const ExportOptions& options) {
   data::save_asset(data::express_as(tuned, format, area, notices), options.out);
 
   for (const std::string& notice : notices) warn(notice);
+  for (const std::string& caveat : sysid::caveats(summary)) warn(caveat);
   if (summary.exit_code != 0) warn("the search behind this asset ended with: " + summary.warnings.front());
   if (options.common.json) {
     std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-export/1"},
                                         {"asset", options.out},
                                         {"not_expressed", notices},
+                                        {"caveats", sysid::caveats(summary)},
                                         {"exit_code", summary.exit_code}}
                      .dump(2)
               << '\n';

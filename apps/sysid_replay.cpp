@@ -12,11 +12,14 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
+#include "data/recording_digest.h"
 #include "data/text.h"
 #include "data/writable.h"
 #include "sim/newton/accepted.h"
+#include "sysid/observe/horizon.h"
 #include "sysid/observe/registration_parameter.h"
 #include "sysid/replay/memory_estimate.h"
+#include "sysid/report/identified_recording.h"
 #include "sysid/report/overlay.h"
 #include "sysid/report/overlay_image.h"
 #include "sysid/report/settings_texts.h"
@@ -34,6 +37,7 @@ struct ReplayVerbOptions {
   std::vector<std::string> holds;
   std::vector<int> frames;
   bool every_step = false;
+  bool no_horizon = false;
   std::string out;
 };
 
@@ -92,11 +96,30 @@ void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, 
                    (fs::path(folder) / "sequence.png").string());
 }
 
-nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const sysid::ReplayResult& motion) {
+// Keyframes that the search behind the asset could not predict count here as little as there.
+void keep_predictable(const sysid::IdentifiedRecording& identified, const CommonOptions& common,
+                      sysid::Replay& replay) {
+  if (const int dropped = sysid::drop_beyond_horizon(identified.horizon_s, replay); dropped > 0)
+    say(common, replay.recording.name + ": the search behind the asset could not predict the motion from " +
+                    data::format_short(*identified.horizon_s) + " s on: " + std::to_string(dropped) +
+                    " keyframes do not count; --no-horizon keeps them");
+}
+
+bool is_of_material(const std::vector<sysid::Axis>& axes) {
+  for (const sysid::Axis& axis : axes)
+    for (const sysid::ParameterInfo& info : sysid::known_parameters())
+      if (info.material && info.name == axis.name) return true;
+  return false;
+}
+
+nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const sysid::ReplayResult& motion,
+                                   const std::optional<sysid::IdentifiedRecording>& identified) {
   const sysid::RecordingScore& recording = result.recordings.front();
   nlohmann::ordered_json json;
   json["schema"] = "flash-sysid-replay/1";
   json["score"] = result.score;
+  json["search_score"] = nullptr;
+  if (identified && identified->score) json["search_score"] = *identified->score;
   json["converged"] = result.converged;
   json["unconverged_share"] = motion.unconverged_share;
   json["residual_max"] = result.residual_max;
@@ -125,7 +148,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   simulated.device = device.device;
   simulated.cuda_devices = device.cuda_devices;
   simulated.element_order = asset.element_order;
-  const sysid::Replay replay = sysid::make_replay(recording, simulated);
+  sysid::Replay replay = sysid::make_replay(recording, simulated);
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;
@@ -143,6 +166,10 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   grid.score = score_settings(options.replay);
   for (const std::string& line : sysid::unlike_the_search(asset, sysid::settings_texts({replay}, grid), axes))
     warn(line);
+
+  const std::optional<sysid::IdentifiedRecording> identified =
+      sysid::identified_recording(asset, data::recording_sha256(recording));
+  if (identified && !options.no_horizon) keep_predictable(*identified, options.common, replay);
 
   const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
   sysid::ReplayResult motion;
@@ -182,11 +209,14 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
          (options.replay.self_contact > 0
               ? "; where it is small, layers kept what a gripper holds from its place"
               : ""));
+  if (identified && !is_of_material(axes))
+    if (const std::string line = sysid::unlike_its_score(*identified, result.score); !line.empty())
+      warn(line);
   for (const sysid::RegistrationParameter& parameter : sysid::registration_parameters)
     if (sysid::is_at_bound(result.recordings.front().bounds_hit, parameter))
       warn(sysid::at_bound_text(parameter, recording.nuisance));
   if (options.common.json) {
-    std::cout << result_json(result, motion).dump(2) << '\n';
+    std::cout << result_json(result, motion, identified).dump(2) << '\n';
   } else {
     const sysid::RecordingScore& fit = result.recordings.front();
     for (const sysid::KeyframeScore& frame : fit.keyframes)
@@ -213,6 +243,8 @@ void add_replay_verb(CLI::App& app, Action& action) {
                   "Keyframes to draw, counted from 0, each and together in sequence.png; without it six",
                   whole_number(0, 1'000'000));
   verb->add_flag("--every-step", options->every_step, "Write the mesh of every step too");
+  verb->add_flag("--no-horizon", options->no_horizon,
+                 "Count keyframes too that the search behind the asset could not predict");
   verb->add_option("-o,--out", options->out, "Folder for meshes, clouds, overlay.csv and pictures")
       ->required();
   add_replay_options(*verb, options->replay);

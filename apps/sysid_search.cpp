@@ -1,6 +1,7 @@
 #include "apps/sysid_search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -26,12 +27,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string value_text(const sysid::ParameterFinding& finding, const std::string& unit) {
+// `by_points`: the interval tells all, and the estimate no more than the others within it.
+std::string value_text(const sysid::ParameterFinding& finding, const std::string& unit, bool by_points) {
   const auto text = [&](double value) {
     return data::format_short(value) + (unit.empty() ? "" : " " + unit);
   };
   switch (finding.identifiable) {
     case sysid::Identifiable::yes:
+      if (by_points)
+        return data::format_short((*finding.interval95)[0]) + " to " + text((*finding.interval95)[1]) +
+               "  (95 %; likeliest of those simulated: " + data::format_short(*finding.estimate) + ")";
       return text(*finding.estimate) + "  (95 %: " + data::format_short((*finding.interval95)[0]) + " to " +
              data::format_short((*finding.interval95)[1]) + ")";
     case sysid::Identifiable::lower_bound:
@@ -50,14 +55,20 @@ std::string edge_of(const sysid::ParameterFinding& finding) {
   return edge.empty() ? "" : "; " + edge;
 }
 
-// "1.59 mm from the observed points, on cells of no size (extrapolated)". Of markers alone it is their own
-// distance, not what noise stated for them makes of it beside other terms.
+// "1.59 mm from the observed points, on cells of no size (extrapolated), 1.64 mm on the mesh searched". Of
+// markers alone it is their own distance, not what noise stated for them makes of it beside other terms.
 std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecording& recording) {
   const auto setting = [&](const char* name) {
     const auto found = summary.settings.find(name);
     return found == summary.settings.end() ? std::string() : found->second;
   };
   char number[32];
+  // What `replay` gives.
+  std::string on_mesh;
+  if (std::isfinite(recording.score_on_mesh) && recording.score_on_mesh != recording.score) {
+    std::snprintf(number, sizeof number, "%.2f mm", 1000 * recording.score_on_mesh);
+    on_mesh = ", " + std::string(number) + " on the mesh searched";
+  }
   const std::string observed = setting("observed");
   const bool of_markers = observed == "markers" && recording.markers;
   std::snprintf(number, sizeof number, "%.2f mm",
@@ -66,7 +77,7 @@ std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecord
          (of_markers            ? " from the markers, root mean square"
           : observed == "cloud" ? " from the observed points"
                                 : " over " + observed) +
-         ", on " + setting("score_of");
+         ", on " + setting("score_of") + on_mesh;
 }
 
 void print_solver_check(const sysid::Summary& summary) {
@@ -80,8 +91,8 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
   const bool has_thickness = sysid::young_is_in_pascal(summary);
   for (const sysid::ParameterFinding& finding : summary.parameters) {
     const sysid::ParameterLabel label = sysid::parameter_label(finding.name, has_thickness);
-    std::printf("%-16s %s%s\n", finding.name.c_str(), value_text(finding, label.unit).c_str(),
-                edge_of(finding).c_str());
+    std::printf("%-16s %s%s\n", finding.name.c_str(),
+                value_text(finding, label.unit, summary.by_points).c_str(), edge_of(finding).c_str());
   }
   for (const sysid::SummaryRecording& recording : summary.recordings)
     std::printf("%-16s %s; offset %.1f %.1f %.1f mm, clock %.0f ms\n",
@@ -89,7 +100,7 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
                 1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
                 1000 * recording.time_offset);
   print_solver_check(summary);
-  if (!summary.next_experiments.empty())
+  if (!summary.next_experiments.empty() || summary.by_points)
     for (const std::string& step : sysid::next_steps(summary)) std::printf("Next: %s\n", step.c_str());
   std::printf("%s\n%s\n", (fs::path(out) / "summary.json").c_str(), (fs::path(out) / "report.html").c_str());
 }

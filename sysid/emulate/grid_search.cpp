@@ -24,8 +24,10 @@ void add_holds(const std::vector<Hold>& holds, GridSettings& settings) {
 ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettings& grid) {
   std::vector<Axis> axes = grid.axes;
   axes.insert(axes.end(), grid.fixed.begin(), grid.fixed.end());
+  axes.insert(axes.end(), grid.centres.begin(), grid.centres.end());
   std::vector<double> all = values;
-  for (const Axis& axis : grid.fixed) all.push_back(axis.values.front());
+  for (const std::vector<Axis>* held : {&grid.fixed, &grid.centres})
+    for (const Axis& axis : *held) all.push_back(axis.values.front());
   return make_candidate(grid.base, axes, all);
 }
 

@@ -9,11 +9,12 @@
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/lattice_about.h"
+#include "sysid/infer/nearby.h"
+#include "sysid/infer/recentre.h"
 #include "sysid/infer/recordings_alone.h"
 #include "sysid/infer/settle.h"
 #include "sysid/infer/verdict.h"
 #include "sysid/infer/weight_scale.h"
-#include "sysid/observe/horizon.h"
 #include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
@@ -67,8 +68,14 @@ std::vector<Replay> finer_replays(const std::vector<Replay>& replays, const Answ
 }
 
 /// Friction, weight, a stiffness, two angles of a pinch, start yaw and table height, and what was stated with
-/// a deviation, to both sides.
-std::size_t most_held_motions(const GridSettings& grid) { return 2 * (7 + grid.deviations.size()); }
+/// a deviation.
+std::size_t most_held(const GridSettings& grid) { return 7 + grid.deviations.size(); }
+
+/// To both sides.
+std::size_t most_held_motions(const GridSettings& grid) { return 2 * most_held(grid); }
+
+/// The best candidate, and one nearby for each parameter.
+std::size_t most_horizon_motions(const GridSettings& grid) { return 1 + grid.axes.size() + most_held(grid); }
 
 std::vector<std::size_t> stiffnesses_of(const std::vector<Axis>& axes) {
   std::vector<std::size_t> stiffnesses;
@@ -189,10 +196,11 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
   if (!unrefined.empty()) answer.warnings.push_back(unrefined);
-  if (settled != Settled::by_emulator)
+  answer.by_points = settled != Settled::by_emulator;
+  if (answer.by_points)
     answer.warnings.emplace_back(
-        "the motion changes too abruptly between the values searched: the answer is by these alone; search "
-        "more values");
+        "the motion changes too abruptly between the values searched: the answer is by these alone, and "
+        "every interval reaches to those next to the likely ones; search more values about the estimate");
   answer.values = concluded.found.look.posterior.values();
   for (const Replay& replay : task.replays)
     answer.motions.push_back(task.store.run(replay, candidate_at(answer.values, task.grid)));
@@ -201,6 +209,32 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
   answer.fit = fit_of(task, concluded.found, answer);
   if (!alone.empty()) answer.agreement = agreement_about(task, concluded.found, answer, alone, held);
   return concluded;
+}
+
+/// Keyframes beyond the time to which a candidate can be predicted lose their weight; warnings say how many.
+void keep_predictable(const std::vector<double>& best, const GridSettings& grid, const MotionStore& store,
+                      GridResults& results, std::vector<Replay>& replays, Answer& answer,
+                      const TellWork& told) {
+  const std::vector<NearbyCandidate> nearby = nearby_candidates(best, grid, replays);
+  answer.horizons = predictability_horizons(replays, candidate_at(best, grid), nearby, store);
+  if (told) {
+    const std::size_t motions = 1 + nearby.size();
+    told({static_cast<int>(replays.size() * motions), 0},
+         {static_cast<int>(replays.size() * (most_horizon_motions(grid) - motions)), 0});
+  }
+  std::vector<std::optional<double>> times;
+  for (const std::optional<Horizon>& horizon : answer.horizons)
+    times.push_back(horizon ? std::optional<double>(horizon->t) : std::nullopt);
+  drop_beyond_horizons(times, results);
+  for (std::size_t r = 0; r < replays.size(); ++r)
+    if (const int dropped = drop_beyond_horizon(times[r], replays[r]); dropped > 0)
+      answer.warnings.push_back(
+          (replays.size() > 1 ? "recording " + std::to_string(r + 1) + ": " : std::string()) +
+          "the motion of the best candidate cannot be predicted from " +
+          data::format_short(answer.horizons[r]->t) + " s on, where a thousandth of " +
+          answer.horizons[r]->parameter + " parts it: " + std::to_string(dropped) + " of " +
+          std::to_string(replays[r].observations.size()) +
+          " keyframes carry no weight; --no-horizon keeps them");
 }
 
 }  // namespace
@@ -235,7 +269,7 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
-  std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) +
+  std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) + most_horizon_motions(grid) +
                         most_motions_alone(recordings, 2 * many_motions(grid.axes)) +
                         lattice_rounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
@@ -254,20 +288,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   const MotionStore store(grid.rollouts);
   std::vector<double> best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   if (settings.horizon) {
-    const ReplayCandidate candidate = candidate_at(best, grid);
-    for (std::size_t r = 0; r < replays.size(); ++r)
-      answer.horizons[r] = predictability_horizon(replays[r], candidate, store);
-    drop_beyond_horizons(answer.horizons, results);
-    for (std::size_t r = 0; r < replays.size(); ++r)
-      if (const int dropped = drop_beyond_horizon(answer.horizons[r], replays[r]); dropped > 0)
-        answer.warnings.push_back(
-            (replays.size() > 1 ? "recording " + std::to_string(r + 1) + ": " : std::string()) +
-            "the motion of the best candidate cannot be predicted from " +
-            data::format_short(*answer.horizons[r]) + " s on: " + std::to_string(dropped) + " of " +
-            std::to_string(replays[r].observations.size()) +
-            " keyframes carry no weight; --no-horizon keeps them");
+    keep_predictable(best, grid, store, results, replays, answer, told);
     answer.best = best_of(results);
     best = results.candidates[static_cast<std::size_t>(answer.best)].values;
+  } else if (told) {
+    told({}, {static_cast<int>(replays.size() * most_horizon_motions(grid)), 0});
   }
 
   GridSettings usable = grid;
@@ -299,6 +324,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
     return answer;
   }
+  found = about_told_grasp(task, std::move(*found), usable, held);
   const std::vector<Alone> alone = alone_over_all(task, *found, results);
   Concluded concluded = conclude(task, std::move(*found), best, held, alone);
   const Found& there = concluded.found;
@@ -317,13 +343,13 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
 
   Posterior posterior = there.look.posterior;
+  if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);
   if (const double spread = spread_of_scale(usable, replays); spread > 0)
     answer.weights =
         weight_of(grid) * scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges).array();
-  for (std::size_t r = 0; r < replays.size(); ++r)
-    answer.misfits.push_back(there.look.likelihood.of_recording(r).misfit());
   const MotionLikelihood at_fit =
       likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held);
+  for (std::size_t r = 0; r < replays.size(); ++r) answer.misfits.push_back(at_fit.of_recording(r).misfit());
   answer.contradicted = contradicted_stiffnesses(task, answer.values, at_fit, errors_about(there, held));
   answer.residuals = left_residuals(at_fit);
   answer.open_information =

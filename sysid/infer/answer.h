@@ -11,6 +11,7 @@
 #include "sysid/infer/finding.h"
 #include "sysid/infer/model_comparison.h"
 #include "sysid/infer/solver_check.h"
+#include "sysid/observe/horizon.h"
 
 namespace flash::sysid {
 
@@ -40,11 +41,13 @@ struct Answer {
   Eigen::VectorXd weights;      ///< of each sample, in the unit of the asset; empty where the weight is known
   Eigen::MatrixXd samples;      ///< of the posterior, values of the axes, a draw a row
   std::vector<Misfit> misfits;  ///< one a recording
-  Eigen::VectorXd open_information;             ///< see model_comparison.h
-  std::vector<LeftResiduals> residuals;         ///< of `fit`, one a recording
-  std::optional<Agreement> agreement;           ///< of several recordings
-  std::vector<SolverCheck> checks;              ///< of the estimate; empty without them
-  std::vector<std::optional<double>> horizons;  ///< of each recording [s]
+  Eigen::VectorXd open_information;              ///< see model_comparison.h
+  std::vector<LeftResiduals> residuals;          ///< of `fit`, one a recording
+  std::optional<Agreement> agreement;            ///< of several recordings
+  std::vector<SolverCheck> checks;               ///< of the estimate; empty without them
+  std::vector<std::optional<Horizon>> horizons;  ///< of each recording
+  bool by_points = false;  ///< of motions too abrupt to interpolate: intervals reach to the values next to
+                           ///< the likely ones (up_to_neighbours)
   std::vector<std::string> warnings;
   std::vector<std::string> contradicted;  ///< what was held and the recordings contradict; mostly none
 };

@@ -212,4 +212,38 @@ Posterior mixture(const Posterior& posterior, Posterior other, double share) {
   return other;
 }
 
+Posterior up_to_neighbours(Posterior posterior, const std::vector<Axis>& searched, unsigned seed) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&] { return static_cast<double>(random() >> 11U) * 0x1p-53; };
+  posterior.reach.resize(static_cast<Eigen::Index>(searched.size()), 2);
+  for (std::size_t k = 0; k < searched.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    const Eigen::VectorXd knots = knots_of(searched)[k];
+    // A value of the search itself, up to rounding of a logarithm and back, is between two others.
+    const double rounding = 1e-9 * (knots[knots.size() - 1] - knots[0]);
+    const auto below = [&](double x) {
+      const auto first = std::lower_bound(knots.begin(), knots.end(), x - rounding);
+      return first == knots.begin() ? *first : *(first - 1);
+    };
+    const auto above = [&](double x) {
+      const auto next = std::upper_bound(knots.begin(), knots.end(), x + rounding);
+      return next == knots.end() ? *(next - 1) : *next;
+    };
+    const double mode = posterior.estimate[column];
+    const double low = below(std::min(mode, posterior.quantile(k, 0.025))),
+                 high = above(std::max(mode, posterior.quantile(k, 0.975)));
+    posterior.reach.row(column) << low, high;
+    for (double& draw : posterior.samples.col(column)) {
+      const double from = below(draw), to = above(draw);
+      if (to > from) draw = from + uniform() * (to - from);
+    }
+    Axis& axis = posterior.axes[k];
+    const auto draws = posterior.samples.col(column);
+    const auto value_at = [&](double x) { return axis.logarithmic ? std::exp(x) : x; };
+    axis.values.front() = std::min(axis.values.front(), value_at(std::min(low, draws.minCoeff())));
+    axis.values.back() = std::max(axis.values.back(), value_at(std::max(high, draws.maxCoeff())));
+  }
+  return posterior;
+}
+
 }  // namespace flash::sysid

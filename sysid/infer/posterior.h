@@ -16,10 +16,11 @@ double value_of(const Axis& axis, double coordinate);
 
 /// What a likelihood says over a grid of parameter values, flat before in the coordinates of the axes.
 struct Posterior {
-  std::vector<Axis> axes;    ///< of the grid
-  Eigen::VectorXd estimate;  ///< coordinates of the likeliest
-  Eigen::MatrixXd samples;   ///< coordinates, a draw a row
-  Eigen::ArrayX2d ends;      ///< least deviance at the low and the high end of each axis, over that of all
+  std::vector<Axis> axes;      ///< of the grid
+  Eigen::VectorXd estimate;    ///< coordinates of the likeliest
+  Eigen::MatrixXd samples;     ///< coordinates, a draw a row
+  Eigen::ArrayX2d ends;        ///< least deviance at the low and the high end of each axis, over that of all
+  Eigen::ArrayX2d reach = {};  ///< coordinates that intervals hold at least; empty: none
 
   std::vector<double> values() const;                  ///< of the estimate
   double quantile(std::size_t k, double share) const;  ///< coordinate of axis k
@@ -36,5 +37,10 @@ Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd
 
 /// A mixture of two posteriors, over the axes and with the estimate of `other`, which has `share` of it.
 Posterior mixture(const Posterior& posterior, Posterior other, double share);
+
+/// What motions say that change abruptly between the values of a search: the likely ones speak for all up to
+/// the values searched below and above them. Each draw becomes one between its neighbours, each parameter by
+/// itself, and intervals reach to the neighbours of what was likely and of the estimate.
+Posterior up_to_neighbours(Posterior posterior, const std::vector<Axis>& searched, unsigned seed = 1);
 
 }  // namespace flash::sysid

@@ -91,8 +91,12 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
       const bool below = open(false) || posterior.quantile(k, 0.025) <= first || edge == RangeEdge::low,
                  above = open(true) || posterior.quantile(k, 0.975) >= last || edge == RangeEdge::high;
       // The most likely values of all parameters together may lie beyond what is likely of one by itself.
-      const double low = std::min(mode, posterior.quantile(k, 0.025)),
-                   high = std::max(mode, posterior.quantile(k, 0.975));
+      double low = std::min(mode, posterior.quantile(k, 0.025)),
+             high = std::max(mode, posterior.quantile(k, 0.975));
+      if (posterior.reach.rows() > 0) {
+        low = std::min(low, posterior.reach(static_cast<Eigen::Index>(k), 0));
+        high = std::max(high, posterior.reach(static_cast<Eigen::Index>(k), 1));
+      }
       finding.interval95 = {below ? range.values.front() : value_of(looked, low),
                             above ? range.values.back() : value_of(looked, high)};
       const std::array<double, 2> usual = usual_of(range, base);

@@ -4,22 +4,33 @@
 
 namespace flash::sysid {
 
-std::optional<double> predictability_horizon(const Replay& replay, const ReplayCandidate& candidate,
-                                             const MotionStore& store, double limit, double perturbation) {
-  ReplayCandidate twin = candidate;
-  twin.material.membrane_stiffness *= 1 + perturbation;
-  twin.material.bending_rigidity *= 1 + perturbation;
-  twin.material.friction *= 1 + perturbation;
-  if (twin.solid) {
-    twin.solid->youngs_modulus *= 1 + perturbation;
-    twin.solid->friction *= 1 + perturbation;
+std::vector<std::optional<Horizon>> predictability_horizons(const std::vector<Replay>& replays,
+                                                            const ReplayCandidate& candidate,
+                                                            const std::vector<NearbyCandidate>& nearby,
+                                                            const MotionStore& store, double limit) {
+  std::vector<WantedMotion> wanted;
+  for (const Replay& replay : replays) {
+    wanted.push_back({&replay, candidate});
+    for (const NearbyCandidate& each : nearby) wanted.push_back({&replay, each.candidate});
   }
-  std::vector<ReplayResult> results(2);
-  store.run(replay, {candidate, twin},
-            [&](std::size_t i, ReplayResult result) { results[i] = std::move(result); });
-  for (const auto& [t, distance] : motion_distance(replay, results[0].motion, results[1].motion))
-    if (!(distance <= limit)) return t;
-  return std::nullopt;
+  store.prepare(wanted);
+  std::vector<std::optional<Horizon>> horizons(replays.size());
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    const ReplayResult here = store.run(replays[r], candidate);
+    double farthest = 0;  // of those that part at the horizon
+    for (const NearbyCandidate& each : nearby) {
+      const ReplayResult there = store.run(replays[r], each.candidate);
+      for (const auto& [t, distance] : motion_distance(replays[r], here.motion, there.motion)) {
+        if (distance <= limit) continue;  // of what diverged it is none
+        if (!horizons[r] || t < horizons[r]->t || (t == horizons[r]->t && distance > farthest)) {
+          horizons[r] = {t, each.parameter};
+          farthest = distance;
+        }
+        break;
+      }
+    }
+  }
+  return horizons;
 }
 
 int drop_beyond_horizon(std::optional<double> horizon, Replay& replay) {

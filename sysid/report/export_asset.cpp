@@ -9,6 +9,7 @@
 #include "data/json_reader.h"
 #include "sim/scene/sheet.h"
 #include "sim/scene/solid.h"
+#include "sysid/report/next_steps.h"
 
 namespace flash::sysid {
 namespace {
@@ -66,7 +67,11 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
   json["recordings"] = Json::array();
   std::optional<double> horizon;
   for (const SummaryRecording& recording : summary.recordings) {
-    json["recordings"].push_back({{"name", recording.name}, {"sha256", recording.sha256}});
+    json["recordings"].push_back(
+        {{"name", recording.name},
+         {"sha256", recording.sha256},
+         {"score_m", number(recording.score_on_mesh)},
+         {"horizon_s", recording.horizon_s ? Json(*recording.horizon_s) : Json(nullptr)}});
     if (recording.horizon_s) horizon = std::min(horizon.value_or(*recording.horizon_s), *recording.horizon_s);
   }
   for (const char* part : {"estimate", "interval95", "identifiable", "fixed"}) json[part] = Json::object();
@@ -91,6 +96,7 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
   json["solver"] = summary.settings;
   json["tool_version"] = summary.tool_version;
   json["randomization"] = randomization_ranges(summary);
+  json["caveats"] = caveats(summary);
   return data::format_json(json);
 }
 

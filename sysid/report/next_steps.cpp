@@ -82,6 +82,19 @@ void add_experiments(const Summary& summary, std::vector<std::string>& steps) {
 
 }  // namespace
 
+std::vector<std::string> caveats(const Summary& summary) {
+  std::vector<std::string> lines;
+  if (summary.by_points)
+    lines.emplace_back(
+        "intervals reach to the values searched next to the likely ones: the motion changes too abruptly "
+        "between them");
+  std::string missed;
+  for (const SummaryRecording& recording : summary.recordings)
+    if (!model_fits(recording)) missed += (missed.empty() ? "" : ", ") + recording.name;
+  if (!missed.empty()) lines.push_back("intervals are those of a model that does not fit " + missed);
+  return lines;
+}
+
 std::vector<std::string> next_steps(const Summary& summary) {
   std::vector<std::string> steps;
   bool usable = false;
@@ -95,8 +108,20 @@ std::vector<std::string> next_steps(const Summary& summary) {
   if (!summary.next_experiments.empty()) add_experiments(summary, steps);
   if (summary.unconverged > 0 && 10 * summary.unconverged > summary.candidates)
     steps.push_back("Allow more solver iterations: more than one candidate in ten did not converge.");
-  if (usable && summary.exit_code == 0)
-    steps.push_back("Export the tuned asset with its intervals: flash-sysid export RUN -o tuned.json");
+  if (summary.by_points)
+    for (const ParameterFinding& finding : summary.parameters)
+      if (finding.interval95)
+        steps.push_back("Search more values of " + label(summary, finding.name) + ": " +
+                        option_of(finding.name) + " " + data::format_short((*finding.interval95)[0]) + ":" +
+                        data::format_short((*finding.interval95)[1]) + ":9" +
+                        (finding.logarithmic ? ":log." : "."));
+  if (usable && summary.exit_code == 0) {
+    std::string with;
+    for (const std::string& caveat : caveats(summary))
+      with += (with.empty() ? ", but the " : ", and the ") + caveat;
+    steps.push_back("Export the tuned asset with its intervals" + with +
+                    ": flash-sysid export RUN -o tuned.json");
+  }
   return steps;
 }
 
@@ -126,6 +151,13 @@ std::vector<std::string> standing_unknowns(const Summary& summary) {
     unknowns.push_back("How far the solver itself moves the answer: no finer solution was asked for.");
   if (left_out("horizon"))
     unknowns.push_back("Until when the motion can be predicted: it was not asked for.");
+  if (summary.by_points)
+    unknowns.emplace_back(
+        "Where the parameters are within their intervals: the motion changes too abruptly between the values "
+        "searched.");
+  for (const SummaryRecording& recording : summary.recordings)
+    if (!model_fits(recording))
+      unknowns.push_back("What else moves the cloth: the model does not fit " + recording.name + ".");
   return unknowns;
 }
 

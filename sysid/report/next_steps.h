@@ -10,8 +10,13 @@ namespace flash::sysid {
 /// that tell best what it does not (Summary::next_experiments), or the export.
 std::vector<std::string> next_steps(const Summary& summary);
 
+/// What whoever uses the intervals has to know, a line each: that they reach to the values searched next to
+/// the likely ones, as motions change too abruptly between them, and that the model does not fit.
+std::vector<std::string> caveats(const Summary& summary);
+
 /// What this search over these recordings cannot know, whatever its parameters: ratios to the weight where
-/// the areal density is not measured, constants that were assumed, and checks that were left out.
+/// the areal density is not measured, constants that were assumed, checks that were left out, and the
+/// caveats.
 std::vector<std::string> standing_unknowns(const Summary& summary);
 
 }  // namespace flash::sysid

@@ -110,6 +110,7 @@ Json recordings_of(const Summary& summary) {
                     {"keyframes", recording.misfit.keyframes},
                     {"worth", number(recording.misfit.worth)},
                     {"horizon_s", optional(recording.horizon_s)},
+                    {"horizon_of", recording.horizon_of},
                     {"frames", frames}});
   }
   return list;
@@ -213,6 +214,7 @@ std::string render_report(const Summary& summary, const GridResults& results,
   json["unknowns"] = standing_unknowns(summary);
   json["next_steps"] = next_steps(summary);
   json["bounds"] = bounds_of(results);
+  json["by_points"] = summary.by_points;
   json["solver_check"] = Json::array();
   for (const SolverCheck& check : summary.solver_check)
     json["solver_check"].push_back({{"what", check.what},

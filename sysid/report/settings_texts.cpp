@@ -15,6 +15,8 @@ namespace {
 
 std::string mm(double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; }
 
+constexpr const char* two_sided_term = "unseen cloth";
+
 /// What was observed, of which the score is a mean: "cloud, contour".
 std::string observed_terms(const std::vector<Replay>& replays, const Objective& objective) {
   std::array<double, 5> weights = {};
@@ -23,7 +25,7 @@ std::string observed_terms(const std::vector<Replay>& replays, const Objective& 
       const std::array<double, 5> of_frame = term_weights(observation, objective);
       for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = std::max(weights[k], of_frame[k]);
     }
-  constexpr std::array<const char*, 5> kNames = {"cloud", "contour", "markers", "force", "unseen cloth"};
+  constexpr std::array<const char*, 5> kNames = {"cloud", "contour", "markers", "force", two_sided_term};
   std::string terms;
   for (std::size_t k = 0; k < weights.size(); ++k)
     if (weights[k] > 0) terms += (terms.empty() ? "" : ", ") + std::string(kNames[k]);
@@ -33,6 +35,15 @@ std::string observed_terms(const std::vector<Replay>& replays, const Objective& 
 std::string sigmas_of(const Objective& objective) {
   return "cloud " + mm(objective.cloud_sigma) + ", contour " + mm(objective.contour_sigma) + ", markers " +
          mm(objective.marker_sigma) + ", force " + data::format_short(objective.force_sigma) + " N";
+}
+
+/// "offset, yaw"; empty where recordings share none.
+std::string shared_errors(const SharedRegistration& shared) {
+  std::string names;
+  for (const auto& [is_shared, name] : {std::pair(shared.offset, "offset"), std::pair(shared.yaw, "yaw"),
+                                        std::pair(shared.time, "time-offset")})
+    if (is_shared) names += (names.empty() ? "" : ", ") + std::string(name);
+  return names;
 }
 
 /// Of the grasps as they were simulated, each once: "clamp".
@@ -99,6 +110,13 @@ std::map<std::string, std::string> settings_texts(const std::vector<Replay>& rep
           ? "mean without the largest " + data::format_short(100 * robust.trim_fraction) + " %"
       : robust.kind == RobustKind::huber ? "Huber, " + data::format_short(1000 * robust.huber_delta) + " mm"
                                          : "mean";
+  texts["min_points"] = std::to_string(replay.settings.min_points);
+  if (std::isfinite(replay.settings.score_from))
+    texts["score_from_s"] = data::format_number(replay.settings.score_from);
+  if (std::isfinite(replay.settings.score_to))
+    texts["score_to_s"] = data::format_number(replay.settings.score_to);
+  if (const std::string shared = shared_errors(settings.score.shared); !shared.empty() && replays.size() > 1)
+    texts["share"] = shared;
   texts["observed"] = observed_terms(replays, settings.score.objective);
   texts["sigmas"] = sigmas_of(settings.score.objective);
   if (const std::string shapes = grasp_shapes(replays); !shapes.empty()) {
@@ -142,6 +160,15 @@ std::vector<std::string> unlike_the_search(const data::Asset& asset,
        {"sigmas", "--sigma"}}};
   if (here("object_mesh") == searched("object_mesh")) differs("--mesh", here("mesh"), searched("mesh"));
   for (const auto& [name, option] : kOptions) differs(option, here(name), searched(name));
+  if (search.contains("min_points")) {  // earlier programs did not say which keyframes counted
+    differs("--from", here("score_from_s"), searched("score_from_s"));
+    differs("--to", here("score_to_s"), searched("score_to_s"));
+    differs("--share", here("share"), searched("share"));
+    const auto is_two_sided = [](const std::string& observed) {
+      return observed.find(two_sided_term) != std::string::npos ? "yes" : "no";
+    };
+    differs("--two-sided", is_two_sided(here("observed")), is_two_sided(searched("observed")));
+  }
   for (const auto& of_recording : values_of_recording(identification)) {
     const std::string& name = of_recording.first;
     const auto hold =

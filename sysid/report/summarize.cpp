@@ -316,7 +316,12 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
       summary.recordings.back().error_cost = answer.residuals[r].error_cost;
       summary.recordings.back().spread = answer.residuals[r].spread;
     }
-    if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
+    if (r < estimate.recordings.size())
+      summary.recordings.back().score_on_mesh = estimate.recordings[r].score;
+    if (r < answer.horizons.size() && answer.horizons[r]) {
+      summary.recordings.back().horizon_s = answer.horizons[r]->t;
+      summary.recordings.back().horizon_of = answer.horizons[r]->parameter;
+    }
   }
   const std::string object = settings.base.solid ? "object" : "cloth";
   for (const SummaryRecording& recording : summary.recordings)
@@ -326,6 +331,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
        warnings_of(summary, estimate, answer.fit.score, results.candidates, replays, settings))
     summary.warnings.push_back(warning);
   summary.warnings.insert(summary.warnings.end(), answer.warnings.begin(), answer.warnings.end());
+  summary.by_points = answer.by_points;
   summary.solver_check = answer.checks;
   summary.open_information = {answer.open_information.begin(), answer.open_information.end()};
   if (answer.agreement) summary.agreement = searched_alone(answer);

@@ -58,6 +58,7 @@ Json to_json(const SummaryRecording& recording) {
   json["time_offset"] = recording.time_offset;
   json["nuisance"] = recording.nuisance;
   json["score"] = number(recording.score);
+  json["score_on_mesh"] = number(recording.score_on_mesh);
   json["error_cost"] = number(recording.error_cost);
   json["spread_m"] = number(recording.spread);
   json["noise_m"] = number(recording.misfit.noise);
@@ -80,6 +81,7 @@ Json to_json(const SummaryRecording& recording) {
                                              {"noise_m", recording.markers->noise}}
                                       : Json(nullptr);
   json["horizon_s"] = optional(recording.horizon_s);
+  json["horizon_of"] = recording.horizon_of.empty() ? Json(nullptr) : Json(recording.horizon_of);
   json["frames"] = Json::array();
   for (const SummaryFrame& frame : recording.frames)
     json["frames"].push_back({{"t", frame.t}, {"score", number(frame.score)}, {"weight", frame.weight}});
@@ -156,7 +158,8 @@ SummaryRecording read_recording(const data::JsonObject& json) {
                       "rough_m",        "misfit_m",        "misfit_rms_m", "misfit_explained_m",
                       "misfit_reach_s", "misfit_reach_m",  "misfit_gain",  "model_fits",
                       "keyframes",      "keyframes_worth", "markers",      "horizon_s",
-                      "frames",         "misfit_draws",    "error_cost",   "spread_m"});
+                      "frames",         "misfit_draws",    "error_cost",   "spread_m",
+                      "score_on_mesh",  "horizon_of"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -165,6 +168,7 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   recording.time_offset = json.number("time_offset");
   recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
   recording.score = score_of(json, "score");
+  recording.score_on_mesh = score_of(json, "score_on_mesh");
   // Earlier programs kept neither.
   recording.error_cost = json.optional_number("error_cost").value_or(0);
   recording.spread = json.optional_number("spread_m").value_or(0);
@@ -195,6 +199,7 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   misfit.keyframes = json.integer("keyframes");
   misfit.worth = score_of(json, "keyframes_worth");
   recording.horizon_s = json.optional_number("horizon_s");
+  recording.horizon_of = json.string("horizon_of", "");
   for (const data::JsonObject& frame : json.objects("frames"))
     recording.frames.push_back({frame.number("t"), score_of(frame, "score"), frame.number("weight")});
   return recording;
@@ -291,6 +296,7 @@ std::string summary_text(const Summary& summary) {
   json["recordings"] = Json::array();
   for (const SummaryRecording& recording : summary.recordings)
     json["recordings"].push_back(to_json(recording));
+  json["by_points"] = summary.by_points;
   json["solver_check"] = Json::array();
   for (const SolverCheck& check : summary.solver_check)
     json["solver_check"].push_back(
@@ -334,6 +340,7 @@ Summary load_summary(const std::string& path) {
                       "samples",
                       "covariance_log",
                       "recordings",
+                      "by_points",
                       "solver_check",
                       "settings",
                       "asset",
@@ -385,6 +392,7 @@ Summary load_summary(const std::string& path) {
     }
   for (const data::JsonObject& recording : json.objects("recordings"))
     summary.recordings.push_back(read_recording(recording));
+  summary.by_points = json.boolean("by_points", false);  // earlier programs did not say
   for (const data::JsonObject& check : json.objects("solver_check"))
     summary.solver_check.push_back(
         {check.string("what"), score_of(check, "surface_change_m"),

@@ -35,12 +35,14 @@ struct SummaryRecording {
   double yaw = 0;                                    ///< [rad]
   double time_offset = 0;                            ///< [s]
   std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
-  double score = 0;                                  ///< [m]
-  double error_cost = 0;                             ///< of errors that are fitted, see LeftResiduals
-  double spread = 0;                                 ///< s of the likelihood, see LeftResiduals [m]
-  Misfit misfit;                                     ///< error of the model itself
-  std::optional<MarkerFit> markers;                  ///< of what was tracked
-  std::optional<double> horizon_s;                   ///< predictable until here [s]
+  double score = 0;                                  ///< on the mesh that the answer is of [m]
+  double score_on_mesh = 0;  ///< on the mesh that was searched; infinite: an earlier program did not say [m]
+  double error_cost = 0;     ///< of errors that are fitted, see LeftResiduals
+  double spread = 0;         ///< s of the likelihood, see LeftResiduals [m]
+  Misfit misfit;             ///< error of the model itself
+  std::optional<MarkerFit> markers;  ///< of what was tracked
+  std::optional<double> horizon_s;   ///< predictable until here [s]
+  std::string horizon_of;            ///< the parameter whose change parts the motion there
   std::vector<SummaryFrame> frames;
 };
 
@@ -82,6 +84,7 @@ struct Summary {
   std::vector<NextExperiment> next_experiments;  ///< best first; empty: they were not ranked
   std::vector<SummaryRecording> recordings;
   std::vector<SolverCheck> solver_check;
+  bool by_points = false;              ///< see Answer
   std::optional<Agreement> agreement;  ///< of several recordings; values in the order of `parameters`
   std::map<std::string, std::string> settings;  ///< constitutive, bending_model, mesh, time_step_s, ...
   std::string asset;                            ///< path of the asset the search started from

@@ -28,10 +28,10 @@ bool scales_with_weight(const Summary& summary, const std::string& name) {
   return is_stiffness(name) && (summary.held.contains("areal_density") || summary.held.contains("density"));
 }
 
-/// Estimate and interval: there as the verdict says, in what was searched. `scales`: with a weight that is
-/// not known.
+/// Estimate and interval: there as the verdict says, in what was searched. `beyond`: of a weight that is not
+/// known, or to values of an earlier search.
 void check_answer(const std::string& path, const std::string& field, const ParameterFinding& finding,
-                  bool scales) {
+                  bool beyond) {
   const auto rounding = [](double value) { return 1e-9 * std::abs(value); };  // of a logarithm and back
   if (finding.identifiable == Identifiable::yes && !finding.estimate)
     throw data::input_error(path, field + ".estimate",
@@ -47,8 +47,8 @@ void check_answer(const std::string& path, const std::string& field, const Param
   // What is open may reach beyond these values, to the ends of an earlier search.
   const Parameter* const info = find_parameter(finding.name);
   const bool open = info != nullptr && finding.identifiable != Identifiable::yes;
-  const bool below = scales || (open && finding.identifiable != Identifiable::lower_bound),
-             above = scales || (open && finding.identifiable != Identifiable::upper_bound);
+  const bool below = beyond || (open && finding.identifiable != Identifiable::lower_bound),
+             above = beyond || (open && finding.identifiable != Identifiable::upper_bound);
   for (const double end : {low, high})
     check_within(path, field + ".interval95", end, below ? info->low : first - rounding(first),
                  above ? info->high : last + rounding(last));
@@ -111,7 +111,7 @@ void check_values(const Summary& summary, const std::string& path) {
     if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
     for (const double value : finding.values)
       check_within(path, field + ".profile.values", value, info->low, info->high);
-    check_answer(path, field, finding, scales_with_weight(summary, finding.name));
+    check_answer(path, field, finding, summary.by_points || scales_with_weight(summary, finding.name));
     for (const double score : finding.scores) check_score(path, field + ".profile.scores", score);
   }
   const auto count = static_cast<Eigen::Index>(summary.parameters.size());

@@ -45,8 +45,10 @@ inline Summary example_summary() {
   recording.time_offset = 0.04;
   recording.nuisance = {{"start_yaw", 0.2}};
   recording.score = 0.004;
+  recording.score_on_mesh = 0.0045;
   recording.misfit = {0.001, 0.0012, 0.003, 0.0032, 0.2, 0.1, 40, true, 0.002, 2, 1.4, {{0.003, 0.2, 0.1}}};
   recording.horizon_s = 1.9;
+  recording.horizon_of = "friction";
   recording.frames = {{1.0, 0.003, 1}, {1.5, 0.005, 1}, {2.0, 0.02, 0}};
   summary.recordings = {recording};
   summary.solver_check = {{"half_step", 1e-4}, {"double_mesh", 2e-4}};

@@ -110,6 +110,42 @@ TEST(Posterior, AMixtureHasItsShareOfEachsDraws) {
   EXPECT_EQ(mixture(by_valley, by_points, 1).samples, by_points.samples);
 }
 
+// Draws in one cell lie anywhere between its ends; what is at a searched value reaches to both beside it.
+TEST(Posterior, WhatIsKnownAtSearchedValuesAloneReachesToTheirNeighbours) {
+  const std::vector<Axis> searched = {parse_axis("bending", "1e-5:1e-3:5:log"),
+                                      parse_axis("friction", "0.3")};
+  const std::vector<double>& knots = searched[0].values;
+  const auto narrow_about = [&](double value) {
+    std::vector<Axis> fine = searched;
+    fine[0].values.clear();
+    Eigen::VectorXd deviance(17);
+    for (int i = 0; i < 17; ++i) {
+      fine[0].values.push_back(value * std::exp(0.002 * (i - 8)));
+      deviance[i] = std::pow((i - 8) / 2.0, 2);
+    }
+    return up_to_neighbours(explore_posterior(fine, deviance), searched);
+  };
+  const double inside = 0.5 * (knots[1] + knots[2]);
+  const Posterior between = narrow_about(inside);
+  EXPECT_NEAR(std::exp(between.reach(0, 0)), knots[1], 1e-9 * knots[1]);
+  EXPECT_NEAR(std::exp(between.reach(0, 1)), knots[2], 1e-9 * knots[2]);
+  EXPECT_NEAR(between.values()[0], inside, 1e-3 * inside);
+  const Eigen::ArrayXd draws = between.samples.col(0).array();
+  EXPECT_GE(draws.minCoeff(), std::log(knots[1]));
+  EXPECT_LE(draws.maxCoeff(), std::log(knots[2]));
+  const auto count = static_cast<double>(draws.size());
+  const double middle = 0.5 * (std::log(knots[1]) + std::log(knots[2]));
+  EXPECT_NEAR((draws < middle).cast<double>().mean(), 0.5, 4 * std::sqrt(0.25 / count));
+  EXPECT_EQ(between.samples.col(1).minCoeff(), 0.3);
+  EXPECT_EQ(between.samples.col(1).maxCoeff(), 0.3);
+
+  const Posterior at = narrow_about(knots[2]);
+  EXPECT_NEAR(std::exp(at.reach(0, 0)), knots[1], 1e-9 * knots[1]);
+  EXPECT_NEAR(std::exp(at.reach(0, 1)), knots[3], 1e-9 * knots[3]);
+  // Nothing was searched beyond the last value.
+  EXPECT_NEAR(std::exp(narrow_about(0.999 * knots[4]).reach(0, 1)), knots[4], 1e-9 * knots[4]);
+}
+
 TEST(Posterior, BothOfTwoValleysAreDrawnFrom) {
   const std::vector<Axis> axes = {parse_axis("start_yaw", "-1:1:33"), parse_axis("friction", "0.3")};
   const Posterior posterior =

@@ -156,6 +156,36 @@ TEST(Verdict, OfAMembraneIsTheSameAsModulusAndAsStiffness) {
   }
 }
 
+/// What a posterior tells that is narrow about 6.4e-5, where motions change too abruptly between the values
+/// of a range.
+ParameterFinding found_by_points(const std::string& range) {
+  const GridResults results = searched(range);
+  const std::vector<Axis> axes = in_own_coordinates(results.axes);
+  std::vector<Axis> fine = axes;
+  fine[0].values.clear();
+  Eigen::VectorXd deviance(17);
+  for (int i = 0; i < 17; ++i) {
+    fine[0].values.push_back(6.4e-5 * std::exp(0.01 * (i - 8)));
+    deviance[i] = std::pow((i - 8) / 2.0, 2);
+  }
+  return findings_of(results, axes, up_to_neighbours(explore_posterior(fine, deviance), axes), {}).front();
+}
+
+// An interval of 4 % about one branch of a motion that jumps would not hold a truth on the other.
+TEST(Verdict, OfAbruptMotionsIsWhatTheSearchedValuesTell) {
+  const ParameterFinding found = found_by_points("3e-5:1e-3:9:log");
+  const std::vector<double> values = parse_axis("bending", "3e-5:1e-3:9:log").values;
+  EXPECT_NEAR((*found.interval95)[0], values[1], 1e-9 * values[1]);  // 4.65e-5
+  EXPECT_NEAR((*found.interval95)[1], values[2], 1e-9 * values[2]);  // 7.21e-5
+  EXPECT_EQ(found.identifiable, Identifiable::yes);
+  // The usual range, two powers of ten, over an eighth of the searched one.
+  EXPECT_NEAR(*found.bits, std::log2(std::log(100) / (std::log(1e-3 / 3e-5) / 8)), 1e-6);
+  // A cell of half of what is usual, or more, is not told.
+  const ParameterFinding coarse = found_by_points("6e-6:6e-4:3:log");
+  EXPECT_LT(*coarse.bits, 1);
+  EXPECT_EQ(coarse.identifiable, Identifiable::no);
+}
+
 TEST(Verdict, AnEstimateBeyondTheQuantilesIsInsideItsInterval) {
   // A posterior that falls from its end steeply: its mode is there, its 2.5 % quantile is not.
   const GridResults results = searched("1e-5:1e-3:5:log");

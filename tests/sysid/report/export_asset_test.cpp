@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "sysid/report/next_steps.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/sysid/summary_fixture.h"
 
@@ -118,6 +119,17 @@ TEST(ExportAsset, IsOfTheSheetThatWasIdentified) {
   std::vector<std::string> notices;
   const data::Asset published = data::express_as(tuned, data::AssetFormat::published, 0.30 * 0.24, notices);
   EXPECT_NEAR(*published.object_mass, 0.018, 1e-12);
+}
+
+TEST(ExportAsset, CarriesTheCaveatsOfItsIntervals) {
+  Summary summary = example_summary();
+  const auto kept = [&] {
+    return nlohmann::json::parse(tuned_asset(towel(), summary).identification)["caveats"];
+  };
+  EXPECT_EQ(kept().size(), 1u);  // the model does not fit
+  summary.by_points = true;
+  EXPECT_EQ(kept(), caveats(summary));
+  EXPECT_EQ(kept().size(), 2u);
 }
 
 TEST(ExportAsset, RandomizesOverTheIntervalOrAllThatWasSearched) {

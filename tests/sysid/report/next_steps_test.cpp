@@ -63,6 +63,23 @@ TEST(NextSteps, DoNotExportWhatCannotBeUsed) {
   EXPECT_FALSE(mentions(next_steps(summary), "export"));
 }
 
+TEST(NextSteps, AnExportIsNeverProposedWithoutItsCaveats) {
+  Summary summary = example_summary();
+  summary.recordings[0].misfit.found = false;
+  EXPECT_TRUE(caveats(summary).empty());
+  EXPECT_TRUE(mentions(next_steps(summary), "with its intervals: flash-sysid export"));
+  EXPECT_FALSE(mentions(standing_unknowns(summary), "does not fit"));
+  summary.recordings[0].misfit.found = true;
+  EXPECT_TRUE(mentions(next_steps(summary), "of a model that does not fit lift: flash-sysid export"));
+  EXPECT_TRUE(mentions(standing_unknowns(summary), "the model does not fit lift"));
+  summary.by_points = true;
+  EXPECT_EQ(caveats(summary).size(), 2u);
+  EXPECT_TRUE(mentions(next_steps(summary), "changes too abruptly between them, and the intervals"));
+  EXPECT_TRUE(
+      mentions(next_steps(summary), "Search more values of bending rigidity: --bending 8e-05:0.00015:9:log"));
+  EXPECT_TRUE(mentions(standing_unknowns(summary), "too abruptly"));
+}
+
 TEST(NextSteps, AnAssumedWeightIsNotKnown) {
   Summary summary = example_summary();
   EXPECT_TRUE(mentions(standing_unknowns(summary), "Weigh the sheet"));

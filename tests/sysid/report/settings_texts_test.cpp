@@ -35,6 +35,17 @@ TEST(SettingsTexts, OfTheSearchBehindAnAssetWhatDiffersIsNamed) {
   EXPECT_EQ(lines[0], "--grasp-within: found 20 mm, the search behind the asset had as recorded");
   EXPECT_EQ(lines[1].find("--time-step: found "), 0u);
 
+  // So do the keyframes that counted. Of an earlier program's asset they are not known.
+  Replay later = replay;
+  later.settings = short_lift(folder).settings;
+  later.settings.score_from = 0.1;
+  const Lines window = unlike_the_search(asset, settings_texts({later}, grid), {yaw, height});
+  EXPECT_EQ(window, Lines{"--from: found 0.1, the search behind the asset had none"});
+  data::Asset earlier = asset;
+  identification["solver"].erase("min_points");
+  earlier.identification = identification.dump();
+  EXPECT_EQ(unlike_the_search(earlier, settings_texts({later}, grid), {yaw, height}), Lines{});
+
   // A mesh of the same object counts, one of another object does not.
   auto other = searched;
   other["mesh"] = "sheet:1x1:0.5 (9 vertices)";

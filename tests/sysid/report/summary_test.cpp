@@ -26,6 +26,8 @@ TEST(Summary, ComesBackFromItsFileAsItWas) {
   EXPECT_TRUE(std::isinf(loaded.parameters[0].scores[2]));
   EXPECT_EQ(loaded.covariance_log, summary.covariance_log);
   EXPECT_EQ(loaded.recordings[0].horizon_s, 1.9);
+  EXPECT_EQ(loaded.recordings[0].horizon_of, "friction");
+  EXPECT_EQ(loaded.recordings[0].score_on_mesh, 0.0045);
   EXPECT_EQ(loaded.recordings[0].frames[2].weight, 0);
   EXPECT_EQ(loaded.fixed.at("friction").source, "measured");
 }
@@ -85,6 +87,19 @@ TEST(Summary, AnIntervalMayReachBeyondWhatWasSimulatedByAnErrorOfTheWeightAlone)
   summary.held["areal_density"] = {0.18, 0.22};
   save_summary(summary, folder / "summary.json");
   EXPECT_EQ(load_summary(folder / "summary.json").parameters[1].interval95, summary.parameters[1].interval95);
+}
+
+// What goes on from a search simulates about its answer alone: the neighbours are those of the search.
+TEST(Summary, AnIntervalOfAbruptMotionsMayReachToTheValuesOfAnEarlierSearch) {
+  const data::TemporaryFolder folder;
+  Summary summary = example_summary();
+  summary.held.clear();
+  summary.by_points = true;
+  (*summary.parameters[1].interval95)[0] = 0.5 * summary.parameters[1].values.front();
+  save_summary(summary, folder / "summary.json");
+  const Summary loaded = load_summary(folder / "summary.json");
+  EXPECT_TRUE(loaded.by_points);
+  EXPECT_EQ(loaded.parameters[1].interval95, summary.parameters[1].interval95);
 }
 
 TEST(Summary, HasTheFieldsOfItsSchema) {

@@ -1,0 +1,53 @@
+#include "sysid/infer/recentre.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sysid/infer/held.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr const char* kSize = "grasp_size";
+
+}  // namespace
+
+std::optional<double> told_grasp_size(const Task& task, const Found& found) {
+  constexpr double kFar = 1.0 / 3, kTold = 0.5;  // standard deviations of what was assumed
+  constexpr double kMost = 2;                    // at a time
+  const auto error = std::find_if(found.errors.begin(), found.errors.end(),
+                                  [](const KnownError& each) { return each.name == kSize; });
+  if (error == found.errors.end()) return std::nullopt;
+  const auto e = static_cast<std::size_t>(error - found.errors.begin());
+  const double asked = found.look.likelihood.asked_of(e);
+  if (!(std::abs(asked) > kFar && found.look.likelihood.spread_of(e) < kTold)) return std::nullopt;
+  const std::vector<HeldParameter> all =
+      held_parameters(task.grid, task.replays, found.look.posterior.values());
+  const auto held =
+      std::find_if(all.begin(), all.end(), [](const HeldParameter& each) { return each.name == kSize; });
+  if (held == all.end()) return std::nullopt;
+  return held->nearer(asked < 0 ? 0 : 1, std::min(std::abs(asked), kMost));
+}
+
+Found about_told_grasp(const Task& task, Found found, GridSettings& grid, std::vector<KnownError>& held) {
+  constexpr int kRounds = 4;
+  const bool finer = found.emulator.share != own_mesh;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::optional<double> size = told_grasp_size(task, found);
+    if (!size) break;
+    const std::vector<Axis> before = grid.centres;
+    grid.centres = {{kSize, {*size}, false}};
+    std::vector<KnownError> here;
+    std::optional<Found> there = look_about(task, extent_of(found.look.posterior.axes),
+                                            found.look.posterior.values(), finer, {}, here);
+    if (!there) {
+      grid.centres = before;
+      break;
+    }
+    found = std::move(*there);
+    held = std::move(here);
+  }
+  return found;
+}
+
+}  // namespace flash::sysid
