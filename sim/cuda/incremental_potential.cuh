@@ -313,8 +313,8 @@ struct SpringSums {
 };
 
 /// Adds what springs need against them to the forces.
-__device__ __noinline__ SpringSums pull_by_springs(const SheetTables& tables, const StepProblem& step,
-                                                   const Iterate& at, double* partial) {
+__device__ inline __noinline__ SpringSums pull_by_springs(const SheetTables& tables, const StepProblem& step,
+                                                          const Iterate& at, double* partial) {
   constexpr double epsilon = 2.220446049250313e-16;
   enum { potential, rounding, count };
   double sums[count], worst = 0;

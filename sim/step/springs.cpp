@@ -1,6 +1,7 @@
 #include "sim/step/springs.h"
 
 #include <algorithm>
+#include <array>
 
 namespace flash::sim {
 
@@ -8,16 +9,16 @@ using data::Points;
 
 namespace {
 
-/// 1 along the axes in which no hold carries a vertex rigidly, else 0.
-Eigen::ArrayX3d free_axes(const Environment& environment) {
-  Eigen::ArrayX3d free = Eigen::ArrayX3d::Ones(environment.state.positions.rows(), 3);
+/// The axes of each vertex along which a hold carries it rigidly.
+std::vector<std::array<bool, 3>> carried_axes(const Environment& environment) {
+  std::vector<std::array<bool, 3>> carried(static_cast<std::size_t>(environment.state.positions.rows()));
   for (std::size_t k = 0; k < environment.state.held.size(); ++k) {
     const std::vector<int>& vertices = environment.state.held[k].vertices;
     for (std::size_t v = 0; v < vertices.size(); ++v)
       for (std::size_t axis = 0; axis < 3 && is_rigid(environment.holds[k], v); ++axis)
-        if (environment.holds[k].axes[axis]) free(vertices[v], static_cast<Eigen::Index>(axis)) = 0;
+        if (environment.holds[k].axes[axis]) carried[static_cast<std::size_t>(vertices[v])][axis] = true;
   }
-  return free;
+  return carried;
 }
 
 Points places_at(const Environment& environment, std::size_t hold, double time) {
@@ -32,7 +33,7 @@ Points places_at(const Environment& environment, std::size_t hold, double time) 
 std::vector<Spring> springs_of(const Environment& environment, double time) {
   std::vector<Spring> springs;
   if (first_soft_hold(environment) == nullptr) return springs;
-  const Eigen::ArrayX3d free = free_axes(environment);
+  const auto carried = carried_axes(environment);
   for (std::size_t k = 0; k < environment.state.held.size(); ++k) {
     const Hold& hold = environment.holds[k];
     const std::vector<int>& vertices = environment.state.held[k].vertices;
@@ -42,8 +43,9 @@ std::vector<Spring> springs_of(const Environment& environment, double time) {
     for (std::size_t v = 0; v < vertices.size(); ++v) {
       if (is_rigid(hold, v)) continue;
       const auto row = static_cast<Eigen::Index>(v);
+      const std::array<bool, 3>& axes = carried[static_cast<std::size_t>(vertices[v])];
       springs.push_back({vertices[v], static_cast<int>(k), static_cast<int>(v), hold.stiffness[row],
-                         free.row(vertices[v]).transpose(), before.row(row).transpose(),
+                         Eigen::Array3d(!axes[0], !axes[1], !axes[2]), before.row(row).transpose(),
                          places.row(row).transpose()});
     }
   }
