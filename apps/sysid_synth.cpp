@@ -172,7 +172,9 @@ int run_synth(SynthOptions options) {
   settings.grasp_shape = data::parse_grasp_shape(options.grasp_shape).value_or(settings.grasp_shape);
   if (options.no_gripper) settings.gripper_half_extents.setZero();
 
-  const data::SheetMaterial material = sysid::make_candidate(base, axes, values).material;
+  const sysid::ReplayCandidate made = sysid::make_candidate(base, axes, values);
+  const data::SheetMaterial& material = made.material;
+  settings.nuisance = made.nuisance;
   options.solver.stop = &stop_on_signals();
   sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
   end_after_signal();

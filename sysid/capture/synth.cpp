@@ -296,7 +296,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
     replay.observations.push_back({.t = keyframe.time + settings.time_offset});
   check_job({replay}, 1, estimate_batch({replay}, 1));
   Motion motion;
-  run(replay, {{material, {}}}, scored_steps(replay), [&](std::size_t, ReplayResult result) {
+  run(replay, {{material, settings.nuisance}}, scored_steps(replay), [&](std::size_t, ReplayResult result) {
     synthetic.residual_max = result.residual_max;
     synthetic.unconverged_share = result.unconverged_share;
     motion = std::move(result.motion);
@@ -379,6 +379,9 @@ std::string truth_text(const data::SheetMaterial& material, const SynthSettings&
                         {"stiffness_damping", material.stiffness_damping}};
   if (std::isfinite(material.yield_curvature))
     json["parameters"]["yield_curvature"] = material.yield_curvature;
+  for (const auto& [name, value] : {std::pair{"grasp_size", settings.nuisance.grasp_size},
+                                    std::pair{"grasp_stiffness", settings.nuisance.grasp_stiffness}})
+    if (value) json["parameters"][name] = *value;
   json["offset"] = {settings.cloud_offset.x(), settings.cloud_offset.y(), settings.cloud_offset.z()};
   json["time_offset"] = settings.time_offset;
   json["depth_noise_m"] = settings.depth_noise;

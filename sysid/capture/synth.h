@@ -11,6 +11,7 @@
 #include "data/recording.h"
 #include "sim/newton/solver.h"
 #include "sim/scene/environment.h"
+#include "sysid/replay/replay.h"
 
 namespace flash::sysid {
 
@@ -28,7 +29,8 @@ struct SynthSettings {
   double rest = 0.0;                            ///< recorded after it [s]
   double keyframe_rate = 10.0;                  ///< [1/s]
   double grasp_within = 0.02;                   ///< of the corner, along each axis [m]
-  std::optional<double> grasp_cell;             ///< as in ReplaySettings
+  std::optional<double> grasp_cell{};           ///< as in ReplaySettings
+  ReplayNuisance nuisance{};                    ///< how the sheet lies and is grasped
   data::GraspShape grasp_shape = data::GraspShape::clamp;  ///< or point: a pinch needs time to close
   std::vector<SynthCamera> cameras;
   double depth_noise = 0.001;  ///< along the ray [m]

@@ -109,7 +109,7 @@ const std::vector<Parameter>& known_parameters() {
                "of table and sheet against the gripper's path"),
       nuisance("grasp_size", "m", Of::sheet, {kTiny, 0.5}, {0.005, 0.05}, of_recording<&N::grasp_size>,
                "clamp: size of the patch at a corner"),
-      nuisance("grasp_stiffness", "N/m^3", Of::sheet, {1, 1e15}, {1e6, 1e11},
+      nuisance("grasp_stiffness", "N/m^3", Of::sheet, {1, rigid_pads}, {1e6, 1e11},
                of_recording<&N::grasp_stiffness>, "clamp: pressure of the pads over how far they give way"),
       nuisance("grasp_depth", "m", Of::both, {kTiny, 0.5}, {0.005, 0.05}, of_recording<&N::grasp_depth>,
                "pinch: size of the folded patch"),

@@ -9,6 +9,7 @@
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/lattice_about.h"
+#include "sysid/infer/mesh_errors.h"
 #include "sysid/infer/nearby.h"
 #include "sysid/infer/recentre.h"
 #include "sysid/infer/recordings_alone.h"
@@ -67,12 +68,12 @@ std::vector<Replay> finer_replays(const std::vector<Replay>& replays, const Answ
   return settings.solver_check ? on_half_the_cell(replays) : std::vector<Replay>();
 }
 
-/// Friction, weight, a stiffness, two angles of a pinch, start yaw and table height, and what was stated with
-/// a deviation.
+/// Friction, weight, a stiffness, size and pads of a clamp or two angles of a pinch, start yaw and table
+/// height, and what was stated with a deviation.
 std::size_t most_held(const GridSettings& grid) { return 7 + grid.deviations.size(); }
 
-/// To both sides.
-std::size_t most_held_motions(const GridSettings& grid) { return 2 * most_held(grid); }
+/// To both sides, and on other cells.
+std::size_t most_held_motions(const GridSettings& grid) { return 2 * most_held(grid) + 2; }
 
 /// The best candidate, and one nearby for each parameter.
 std::size_t most_horizon_motions(const GridSettings& grid) { return 1 + grid.axes.size() + most_held(grid); }
@@ -166,8 +167,9 @@ std::optional<Concluded> conclude_on_own_mesh(const Task& task, const Found& abo
     task.told({}, {-more.motions * static_cast<int>(task.replays.size()), -more.scores});
   }
   std::vector<KnownError> of_solution = errors_about(about, {}), errors = held;
-  for (KnownError& error : of_solution) error.corrects = false;
   errors.insert(errors.end(), of_solution.begin(), of_solution.end());
+  for (std::vector<KnownError>* all : {&of_solution, &errors})
+    for (KnownError& error : *all) error.corrects = false;
   std::optional<Found> found =
       look_with(own, std::move(*emulator), axes, cells_about(best, axes), best, errors, errors);
   if (!found) return std::nullopt;
@@ -250,7 +252,8 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
                                const AnswerSettings& settings, const TellWork& told) {
   const MotionStore store(grid.rollouts);
   const std::vector<Replay> finer = finer_replays(replays, settings);
-  const Task task{replays, finer, grid, grid.axes, settings, store, told};
+  const OtherCells cells = settings.solver_check ? other_cells(replays) : OtherCells();
+  const Task task{replays, finer, grid, grid.axes, settings, store, told, &cells};
   Extent extent = around;
   std::vector<double> at = start;
   std::vector<KnownError> held;
@@ -304,7 +307,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
       settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
   usable.axes = focused(usable.axes, best);
   const std::vector<Replay> finer = finer_replays(replays, settings);
-  const Task task{replays, finer, usable, ranges, settings, store, told};
+  const OtherCells cells = settings.solver_check ? other_cells(replays) : OtherCells();
+  const Task task{replays, finer, usable, ranges, settings, store, told, &cells};
   std::optional<Emulator> emulator;
   if (settings.solver_check) emulator = emulator_over(task, usable.axes, thinned(usable.axes), false);
   if (!emulator) emulator = emulator_over(task, usable.axes, {}, false);
@@ -341,6 +345,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         " on the same mesh: errors of the cells, of the step and of what is held decide "
         "between them; search on a finer mesh, with a shorter step, or what is held too");
   warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
+  if (std::any_of(held.begin(), held.end(),
+                  [](const KnownError& error) { return error.name == unsettled_cells; }))
+    answer.warnings.emplace_back(
+        "the motion does not settle as the cells at the grasp shrink: the intervals take what smaller ones "
+        "change as a whole; search on a finer mesh, or with a smaller --grasp-cell");
 
   Posterior posterior = there.look.posterior;
   if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);

@@ -88,7 +88,12 @@ void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior&
     for (const Replay& replay : each.replays) wanted.push_back({&replay, candidate});
     if (each.what == half_step_name) of_draws = &each.replays;
   }
-  if (with_held) add_wanted(task, held_of(task, values), values, wanted);
+  if (with_held) {
+    add_wanted(task, held_of(task, values), values, wanted);
+    if (task.cells != nullptr)
+      for (const std::vector<Replay>* replays : {&task.cells->of_sheet, &task.cells->between})
+        for (const Replay& replay : *replays) wanted.push_back({&replay, candidate});
+  }
   for (const std::vector<double>& draw : draws_of(posterior))
     for (const Replay& replay : *of_draws) wanted.push_back({&replay, candidate_at(draw, task.grid)});
   task.store.prepare(wanted);

@@ -10,11 +10,9 @@ namespace flash::sysid {
 namespace {
 
 constexpr double kFriction = 2, kStiffness = 2, kWeight = 1.1;  // factors within which each is known
-constexpr double kPinch = 0.2;  // angles of the ridge that two fingers fold [rad]
-constexpr double kPatch = 0.003;  // where fingers end on a sheet [m]
-/// Pads that give way by some millimetres under a sheet, as soft silicone does, and such as hardly do: these
-/// are a standard deviation apart, and one to the other side is harder still [N/m^3].
-constexpr double kSoftPads = 1e8, kHardPads = 1e12;
+constexpr double kPinch = 0.2;     // angles of the ridge that two fingers fold [rad]
+constexpr double kPatch = 0.003;   // where fingers end on a sheet [m]
+constexpr double kSoftPads = 1e8;  // of soft silicone, some millimetres thick [N/m^3]
 
 bool is_searched(const std::string& name, const GridSettings& grid) {
   return std::any_of(grid.axes.begin(), grid.axes.end(),
@@ -117,7 +115,7 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
     if (!is_stated("grasp_size", grid))
       held.push_back({"grasp_size", at_size, within(at_size, kPatch, 0), false});
     if (!is_stated("grasp_stiffness", grid) && !candidate.nuisance.grasp_stiffness)
-      held.push_back({"grasp_stiffness", kHardPads, {kSoftPads, kHardPads}, false});
+      held.push_back({"grasp_stiffness", rigid_pads, {kSoftPads, rigid_pads}, false});
   }
   add_bound("start_yaw", yaw);
   add_bound("table_height", height);
@@ -133,7 +131,7 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
 ReplayCandidate candidate_with(const std::vector<double>& values, const GridSettings& grid,
                                const std::string& name, double value) {
   GridSettings held = grid;
-  held.fixed.push_back({name, {value}, false});
+  held.centres.push_back({name, {value}, false});  // the last word
   return candidate_at(values, held);
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "data/parallel.h"
+#include "sysid/infer/mesh_errors.h"
 
 namespace flash::sysid {
 
@@ -59,7 +60,11 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   simulate_ahead(task, emulator, first.posterior, finer, held.empty());
   std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values(), std::move(finer));
   if (!estimate) return std::nullopt;
-  if (held.empty()) held = errors_of_held(task, first.posterior.values(), estimate->motions);
+  if (held.empty()) {
+    held = errors_of_held(task, first.posterior.values(), estimate->motions);
+    for (KnownError& error : errors_of_cells(task, emulator, first.posterior.values(), estimate->motions))
+      held.push_back(std::move(error));
+  }
   errors = estimate->errors;
   errors.insert(errors.end(), held.begin(), held.end());
   for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
@@ -220,6 +225,9 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   std::vector<SolverCheck> checks;
   for (const KnownError& error : found.estimate.errors)
     checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
+  for (const KnownError& error : found.errors)
+    if (error.name == half_sheet_cells)
+      checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
   return checks;
 }
 

@@ -70,4 +70,17 @@ std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays) {
   return halves;
 }
 
+OtherCells other_cells(const std::vector<Replay>& replays) {
+  OtherCells cells;
+  for (const Replay& replay : replays) {
+    if (!are_graded(replay.recording, replay.settings)) return {};
+    data::Recording halved = replay.recording, between = replay.recording;
+    halve_cells(halved);
+    refine_grasps(replay.settings, 0.5, between);
+    cells.of_sheet.push_back(on_mesh(replay, std::move(halved), replay.settings));
+    cells.between.push_back(on_mesh(replay, std::move(between), replay.settings));
+  }
+  return cells;
+}
+
 }  // namespace flash::sysid

@@ -16,7 +16,14 @@ std::string scaled_cell(const std::string& specification, double factor);
 /// own.
 Replay on_half_the_cell(const Replay& replay);
 
-/// Of all of them; empty where one has none.
 std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays);
+
+/// Other cells of replays whose cells shrink towards grasps, of which on_half_the_cell leaves those of the
+/// sheet as they are; both empty where one is not such a replay.
+struct OtherCells {
+  std::vector<Replay> of_sheet;  ///< all cells halved
+  std::vector<Replay> between;   ///< those at the grasps halved: halfway to on_half_the_cell
+};
+OtherCells other_cells(const std::vector<Replay>& replays);
 
 }  // namespace flash::sysid

@@ -40,8 +40,8 @@ int nearest_to_point(const Replay& replay, const data::RecordedGrasp& grasp, con
 }
 
 /// Springs between the vertices of a patch and pads that give way, a Winkler foundation of `modulus` [N/m^3]
-/// under the triangles inside the patch. The vertex that a grasp in a point would hold is held rigidly: so the
-/// softest pads are a point, and the stiffest a clamp.
+/// under the triangles inside the patch. The vertex that a grasp in a point would hold is held rigidly: so
+/// the softest pads are a point, and the stiffest a clamp.
 Eigen::VectorXd pad_stiffness(const Replay& replay, const data::RecordedGrasp& grasp, double modulus,
                               const std::vector<int>& patch) {
   std::map<int, double> area;  // of the pads [m^2]
@@ -143,7 +143,7 @@ sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, i
 
   const data::GraspShape shape = shape_of(recorded, replay.settings);
   const bool pinched = shape == data::GraspShape::pinch;
-  if (shape == data::GraspShape::clamp && nuisance.grasp_stiffness)
+  if (shape == data::GraspShape::clamp && nuisance.grasp_stiffness.value_or(rigid_pads) < rigid_pads)
     hold.stiffness = pad_stiffness(replay, recorded, *nuisance.grasp_stiffness, hold.vertices);
   if (!from_beginning || (!pinched && nuisance.table_height == 0)) return hold;
   data::Points targets = flat(hold.vertices, Eigen::all);

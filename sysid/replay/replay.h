@@ -39,12 +39,16 @@ struct ReplaySettings {
   std::vector<int> cuda_devices{};        ///< which share them; empty: the first
 };
 
+/// Stiffness of pads that do not give way [N/m^3].
+inline constexpr double rigid_pads = 1e15;
+
 /// How the sheet lay and how it was grasped: what the recording leaves open and what changes the motion.
 struct ReplayNuisance {
   double start_yaw = 0;     ///< turn of the sheet on the table about the gripper's first position [rad]
   double table_height = 0;  ///< of table and sheet, against the gripper's path [m]
   std::optional<double> grasp_size;       ///< clamp: of patches at corners; absent: the recording's [m]
-  std::optional<double> grasp_stiffness;  ///< clamp: of the pads; absent: they do not give way [N/m^3]
+  std::optional<double> grasp_stiffness;  ///< clamp: of the pads; absent, or from rigid_pads on: they do not
+                                          ///< give way [N/m^3]
   std::optional<double> grasp_depth;      ///< pinch: size of the folded patch; absent: the recording's [m]
   std::optional<double> grasp_direction;  ///< pinch: angle of the ridge from the sheet's diagonal; absent:
                                           ///< the recording's [rad]

@@ -1,0 +1,67 @@
+#include "sysid/infer/mesh_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace flash::sysid {
+namespace {
+
+/// The estimate on other cells; empty where one motion diverged.
+std::vector<ReplayResult> motions_on(const Task& task, const std::vector<Replay>& replays,
+                                     const std::vector<double>& values) {
+  std::vector<ReplayResult> results;
+  for (const Replay& replay : replays) {
+    results.push_back(task.store.run(replay, candidate_at(values, task.grid)));
+    task.tell_motion();
+    if (!results.back().finite) return {};
+  }
+  return results;
+}
+
+/// Sum of the squares of b - a over the first vertices of both, at the steps that both keep.
+double squared_difference(const Motion& a, const Motion& b, Eigen::Index vertices) {
+  double sum = 0;
+  for (std::size_t i = 0; i < std::min(a.positions.size(), b.positions.size()); ++i)
+    if (a.positions[i].rows() > 0 && b.positions[i].rows() > 0)
+      sum += (b.positions[i].topRows(vertices) - a.positions[i].topRows(vertices)).squaredNorm();
+  return sum;
+}
+
+KnownError error_of(const char* name, std::shared_ptr<const Motions> from, Motions to, bool corrects) {
+  return {
+      {{-1, std::move(from)}, {1, std::make_shared<const Motions>(std::move(to))}}, true, corrects, {}, name};
+}
+
+}  // namespace
+
+double observed_ratio(const std::vector<ReplayResult>& cells, const std::vector<ReplayResult>& halves,
+                      const std::vector<ReplayResult>& quarters) {
+  double first = 0, second = 0;
+  for (std::size_t r = 0; r < cells.size(); ++r) {
+    const Eigen::Index vertices = cells[r].motion.positions.front().rows();
+    first += squared_difference(cells[r].motion, halves[r].motion, vertices);
+    second += squared_difference(halves[r].motion, quarters[r].motion, vertices);
+  }
+  return first > 0 ? std::sqrt(second / first) : 0;
+}
+
+std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulator,
+                                        const std::vector<double>& values,
+                                        const std::vector<ReplayResult>& here) {
+  if (task.cells == nullptr || task.cells->of_sheet.empty()) return {};
+  std::vector<KnownError> errors;
+  const auto from = std::make_shared<const Motions>(Motions{task.replays, here});
+  if (auto halved = motions_on(task, task.cells->of_sheet, values); !halved.empty())
+    errors.push_back(error_of(half_sheet_cells, from, {task.cells->of_sheet, std::move(halved)}, true));
+  if (emulator.share == own_mesh) return errors;
+  const std::vector<Replay> on_finer = replays_of(emulator);
+  std::vector<ReplayResult> finer = motions_on(task, on_finer, values);
+  const std::vector<ReplayResult> between = motions_on(task, task.cells->between, values);
+  if (!finer.empty() && !between.empty() && observed_ratio(here, between, finer) > most_ratio)
+    errors.push_back(error_of(unsettled_cells, from, {on_finer, std::move(finer)}, false));
+  return errors;
+}
+
+}  // namespace flash::sysid

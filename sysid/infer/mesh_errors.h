@@ -1,0 +1,33 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "sysid/infer/estimate_errors.h"
+
+namespace flash::sysid {
+
+/// Errors of the cells of an estimate where those of a search shrink towards grasps, whose finer mesh has
+/// smaller cells there alone. `here`: the estimate on the search's own mesh, one motion a recording. Empty
+/// where the task has no other cells; what diverged is left out.
+///
+/// "half_sheet_cells": by what half of all cells moves it; motions are corrected by that.
+/// "unsettled_cells": the way to the finer mesh as a whole, where differences do not fall as the
+/// extrapolation to cells of no size assumes (observed_ratio above most_ratio).
+std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulator,
+                                        const std::vector<double>& values,
+                                        const std::vector<ReplayResult>& here);
+
+/// How differences between motions fall as cells are halved, and halved again: |x_4 - x_2| / |x_2 - x_1|,
+/// over the vertices that all three meshes have, the first ones. An error of first order falls to 1/2, of
+/// second order to 1/4. One motion a recording.
+double observed_ratio(const std::vector<ReplayResult>& cells, const std::vector<ReplayResult>& halves,
+                      const std::vector<ReplayResult>& quarters);
+
+/// From this ratio on the two halvings do not tell where the next ones lead. The extrapolation assumes 1/2,
+/// and what it leaves to chance, twice its last step, allows for no more than 3/4.
+inline constexpr double most_ratio = 0.75;
+
+inline constexpr const char* half_sheet_cells = "half_sheet_cells";
+inline constexpr const char* unsettled_cells = "unsettled_cells";
+
+}  // namespace flash::sysid
