@@ -38,5 +38,9 @@ function(flash_source_digest target symbol)
     COMMENT "Hashing the sources of ${symbol}"
     COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} "-DFOLDERS=${ARGN}" -DSYMBOL=${symbol} -DOUTPUT=${output}
             -P ${FLASH_SOURCE_DIGEST_SCRIPT})
-  target_sources(${target} PRIVATE ${output})
+  # By itself, since what makes a source of a target waits for all libraries that the target links.
+  set(objects flash_digest_of_${symbol})
+  add_library(${objects} OBJECT ${output})
+  set_target_properties(${objects} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_sources(${target} PRIVATE $<TARGET_OBJECTS:${objects}>)
 endfunction()

@@ -70,7 +70,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
 
 /// Where a search goes on from a `start` inside the range of `grid.axes`, one value an axis: three values of
 /// each parameter, as far about what its motions make likely as the posterior needs. `around`: the first
-/// three. A parameter that is not told to a cell of `grid.axes` has more, thirty simulations in all.
+/// three. A parameter that is not told to a cell of `grid.axes` has more, thirty simulations in all (of four
+/// parameters 81).
 std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
                                const std::vector<double>& start, const Extent& around,
                                const AnswerSettings& settings, const TellWork& told = {});
