@@ -107,7 +107,7 @@ void keep_predictable(const sysid::IdentifiedRecording& identified, const Common
 
 bool is_of_material(const std::vector<sysid::Axis>& axes) {
   for (const sysid::Axis& axis : axes)
-    for (const sysid::ParameterInfo& info : sysid::known_parameters())
+    for (const sysid::Parameter& info : sysid::known_parameters())
       if (info.material && info.name == axis.name) return true;
   return false;
 }

@@ -22,6 +22,7 @@ namespace flash::sysid {
 namespace {
 
 constexpr double kFarther = 1.3;  // of a distance over that of the best candidate
+constexpr double kAbrupt = 1e-3;  // by which motions that can be predicted do not part [m]
 
 std::string millimetres(double distance) { return data::format_short(1e3 * distance) + " mm"; }
 
@@ -198,7 +199,8 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
   if (!unrefined.empty()) answer.warnings.push_back(unrefined);
-  answer.by_points = settled != Settled::by_emulator;
+  // An emulator that misses, once its points are dense about the answer, interpolates what jumps.
+  answer.by_points = settled != Settled::by_emulator || missed_by_emulator(concluded.found) > kAbrupt;
   if (answer.by_points)
     answer.warnings.emplace_back(
         "the motion changes too abruptly between the values searched: the answer is by these alone, and "

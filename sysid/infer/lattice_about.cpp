@@ -7,6 +7,7 @@
 
 #include "data/parallel.h"
 #include "sysid/infer/mesh_errors.h"
+#include "sysid/observe/motion_distance.h"
 
 namespace flash::sysid {
 
@@ -218,6 +219,21 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
     extent = std::move(next);
   }
   return found;
+}
+
+double missed_by_emulator(const Found& found) {
+  const auto apart = [](const KnownError& error) {
+    const Motions &from = *error.terms[0].motions, &to = *error.terms[1].motions;
+    return mean_motion_distance(from.replays, from.results, to.results);
+  };
+  double half_step = 0, most = 0;
+  for (const KnownError& error : found.estimate.errors) {
+    if (error.name == "half_step") half_step = apart(error);
+    if (error.name == "estimate_itself") most = apart(error);
+  }
+  for (const KnownError& error : found.errors)
+    if (error.name.empty()) most = std::max(most, apart(error) - half_step);
+  return most;
 }
 
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {

@@ -65,6 +65,11 @@ MotionLikelihood likelihood_about(const Task& task, const Found& found, const st
                                   const std::vector<double>& values,
                                   const std::vector<ReplayResult>& reference, std::vector<KnownError> more);
 
+/// By how much the emulator misses what was simulated at the estimate or at a draw of the posterior, the
+/// larger: the mean distance of both surfaces over the weighing keyframes [m]. Draws are simulated with half
+/// the step where that is an error by itself: what it changes at the estimate is taken off.
+double missed_by_emulator(const Found& found);
+
 /// How far each error of the estimate moves the surface, and the parameters if they had to explain it.
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found);
 

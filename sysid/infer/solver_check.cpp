@@ -62,21 +62,25 @@ std::map<std::string, double> shift_between(const Sensitivity& sensitivity,
   return named;
 }
 
+double mean_motion_distance(const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
+                            const std::vector<ReplayResult>& others) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t r = 0; r < replays.size(); ++r)
+    for (const auto& [t, distance] : motion_distance(replays[r], motions[r].motion, others[r].motion)) {
+      sum += distance;
+      ++count;
+    }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
 SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensitivity,
                               const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
                               const std::vector<Replay>& finer,
                               const std::vector<ReplayResult>& finer_motions, const std::vector<Axis>& axes) {
   SolverCheck found;
   found.what = what;
-  double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t r = 0; r < replays.size(); ++r)
-    for (const auto& [t, distance] :
-         motion_distance(replays[r], motions[r].motion, finer_motions[r].motion)) {
-      sum += distance;
-      ++count;
-    }
-  found.surface_change_m = count > 0 ? sum / static_cast<double>(count) : 0;
+  found.surface_change_m = mean_motion_distance(replays, motions, finer_motions);
   found.shift = shift_between(sensitivity, replays, motions, finer, finer_motions, axes);
   return found;
 }

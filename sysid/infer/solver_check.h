@@ -44,9 +44,13 @@ std::map<std::string, double> shift_between(const Sensitivity& sensitivity,
                                             const std::vector<ReplayResult>& finer_motions,
                                             const std::vector<Axis>& axes);
 
+/// Mean over the weighing keyframes of all recordings of the mean distance from the vertices of one run to
+/// the surface of the other, which is of `replays` [m].
+double mean_motion_distance(const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
+                            const std::vector<ReplayResult>& others);
+
 /// How far `finer_motions` are from `motions`, and the change of the parameters that explains it.
-/// `surface_change_m`: mean over the weighing keyframes of the mean distance from the vertices of the finer
-/// run to the surface of the other, before any registration.
+/// `surface_change_m`: their mean_motion_distance, before any registration.
 SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensitivity,
                               const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
                               const std::vector<Replay>& finer,

@@ -116,11 +116,10 @@ std::vector<std::string> next_steps(const Summary& summary) {
                         data::format_short((*finding.interval95)[1]) + ":9" +
                         (finding.logarithmic ? ":log." : "."));
   if (usable && summary.exit_code == 0) {
-    std::string with;
-    for (const std::string& caveat : caveats(summary))
-      with += (with.empty() ? ", but the " : ", and the ") + caveat;
-    steps.push_back("Export the tuned asset with its intervals" + with +
-                    ": flash-sysid export RUN -o tuned.json");
+    std::string but;
+    for (const std::string& caveat : caveats(summary)) but += (but.empty() ? " (" : "; ") + caveat;
+    steps.push_back("Export the tuned asset with its intervals: flash-sysid export RUN -o tuned.json" + but +
+                    (but.empty() ? "" : ")"));
   }
   return steps;
 }

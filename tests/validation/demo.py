@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The main job of `make demo`, whose commands this reads from the Makefile: README has the same, the recorded truth lies inside
-the intervals that it ends with, and the tuned asset has the estimates."""
+the intervals that it ends with, and the tuned asset has the estimates and is replayed to the score of the search."""
 import argparse
 import json
 import pathlib
@@ -40,7 +40,15 @@ def main():
     wrong = [name for name, finding in found.items()
              if finding["identifiable"] != "yes" or tuned[name] != finding["estimate"]
              or not finding["interval95"][0] <= truth[name] <= finding["interval95"][1]]
-    sys.exit(f"not told, or not as exported: {', '.join(wrong)}" if wrong or len(found) != 2 else 0)
+    if wrong or len(found) != 2:
+        sys.exit(f"not told, or not as exported: {', '.join(wrong)}")
+    replayed = subprocess.run([options.sysid, "replay", options.out / "lift", "--asset", options.out / "tuned.json", "--force",
+                               "--json", "-o", options.out / "check"], check=True, capture_output=True, text=True)
+    score = json.loads(replayed.stdout)["score"]
+    searched = json.loads((options.out / "run/summary.json").read_text())["best"]["score_on_mesh"]
+    # The asset has every digit of the estimate: what is left is rounding, as solved steps pass it on.
+    if abs(score - searched) > 1e-4 * searched or "score is" in replayed.stderr:
+        sys.exit(f"replay of tuned.json scores {score}, the search had {searched}: {replayed.stderr}")
 
 
 if __name__ == "__main__":

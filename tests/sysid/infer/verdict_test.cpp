@@ -181,7 +181,7 @@ TEST(Verdict, OfAbruptMotionsIsWhatTheSearchedValuesTell) {
   // The usual range, two powers of ten, over an eighth of the searched one.
   EXPECT_NEAR(*found.bits, std::log2(std::log(100) / (std::log(1e-3 / 3e-5) / 8)), 1e-6);
   // A cell of half of what is usual, or more, is not told.
-  const ParameterFinding coarse = found_by_points("6e-6:6e-4:3:log");
+  const ParameterFinding coarse = found_by_points("5e-6:2e-4:2:log");
   EXPECT_LT(*coarse.bits, 1);
   EXPECT_EQ(coarse.identifiable, Identifiable::no);
 }

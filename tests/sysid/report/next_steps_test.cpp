@@ -67,14 +67,16 @@ TEST(NextSteps, AnExportIsNeverProposedWithoutItsCaveats) {
   Summary summary = example_summary();
   summary.recordings[0].misfit.found = false;
   EXPECT_TRUE(caveats(summary).empty());
-  EXPECT_TRUE(mentions(next_steps(summary), "with its intervals: flash-sysid export"));
+  EXPECT_EQ(next_steps(summary).back(),
+            "Export the tuned asset with its intervals: flash-sysid export RUN -o tuned.json");
   EXPECT_FALSE(mentions(standing_unknowns(summary), "does not fit"));
   summary.recordings[0].misfit.found = true;
-  EXPECT_TRUE(mentions(next_steps(summary), "of a model that does not fit lift: flash-sysid export"));
+  EXPECT_TRUE(mentions(next_steps(summary),
+                       "export RUN -o tuned.json (intervals are those of a model that does not fit lift)"));
   EXPECT_TRUE(mentions(standing_unknowns(summary), "the model does not fit lift"));
   summary.by_points = true;
   EXPECT_EQ(caveats(summary).size(), 2u);
-  EXPECT_TRUE(mentions(next_steps(summary), "changes too abruptly between them, and the intervals"));
+  EXPECT_TRUE(mentions(next_steps(summary), "changes too abruptly between them; intervals are"));
   EXPECT_TRUE(
       mentions(next_steps(summary), "Search more values of bending rigidity: --bending 8e-05:0.00015:9:log"));
   EXPECT_TRUE(mentions(standing_unknowns(summary), "too abruptly"));
