@@ -9,6 +9,8 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
+#include "sysid/replay/grasp_mesh.h"
+#include "sysid/replay/recorded_grasp.h"
 
 namespace flash::sysid {
 namespace {
@@ -216,14 +218,29 @@ void check_axes(const std::vector<Axis>& axes, const MaterialBase& base) {
 }
 
 void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& replays) {
-  for (const Replay& replay : replays)
-    for (const data::RecordedGrasp& grasp : replay.recording.grasps)
-      if (replay.settings.grasp_shape.value_or(grasp.shape) == data::GraspShape::pinch) return;
-  for (const Axis& axis : axes)
-    if (axis.name.starts_with("grasp_"))
-      throw data::InputError(option_of(axis.name) +
-                             ": acts on a grasp of the shape pinch, and the recordings have none; choose "
-                             "--grasp-shape pinch, or leave it out");
+  for (const Axis& axis : axes) {
+    if (!axis.name.starts_with("grasp_")) continue;
+    const bool of_size = axis.name == "grasp_size";
+    if (axis.name == "grasp_stiffness" && axis.values.front() < rigid_pads)
+      for (const Replay& replay : replays)
+        if (replay.settings.clamp_slopes)
+          throw data::InputError(
+              "--grasp-stiffness: pads that give way hold no slope; leave out --clamp-slopes");
+    const data::GraspShape shape =
+        of_size || axis.name == "grasp_stiffness" ? data::GraspShape::clamp : data::GraspShape::pinch;
+    const auto acts_on = [&](const Replay& replay) {
+      if (of_size) return grasp_size(replay.recording, replay.settings).has_value();
+      return std::any_of(
+          replay.recording.grasps.begin(), replay.recording.grasps.end(),
+          [&](const data::RecordedGrasp& grasp) { return shape_of(grasp, replay.settings) == shape; });
+    };
+    if (std::any_of(replays.begin(), replays.end(), acts_on)) continue;
+    const std::string name = data::to_string(shape);
+    throw data::InputError(option_of(axis.name) + ": acts on a grasp of the shape " + name +
+                           (of_size ? " at a corner of a sheet" : "") +
+                           ", and the recordings have none; choose --grasp-shape " + name +
+                           ", or leave it out");
+  }
 }
 
 ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,

@@ -53,8 +53,8 @@ double count_candidates(const std::vector<Axis>& axes);
 /// other way round; more than a million candidates. Throws data::InputError with the reason.
 void check_axes(const std::vector<Axis>& axes, const MaterialBase& base);
 
-/// Refuses grasp_depth, grasp_direction and grasp_pitch where no grasp of the recordings is a pinch: nothing
-/// would change with them.
+/// Refuses parameters of a grasp that act on none of the recordings: grasp_depth, grasp_direction and
+/// grasp_pitch act on a pinch, grasp_stiffness on a clamp, grasp_size on one at a corner.
 void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& replays);
 
 /// The base with the named values in place of its own. Fixed parameters are axes of one value.

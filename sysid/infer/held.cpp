@@ -114,7 +114,9 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
     const double at_size = candidate.nuisance.grasp_size.value_or(*size);
     if (!is_stated("grasp_size", grid))
       held.push_back({"grasp_size", at_size, within(at_size, kPatch, 0), false});
-    if (!is_stated("grasp_stiffness", grid) && !candidate.nuisance.grasp_stiffness)
+    const bool slopes = std::any_of(replays.begin(), replays.end(),
+                                    [](const Replay& replay) { return replay.settings.clamp_slopes; });
+    if (!slopes && !is_stated("grasp_stiffness", grid) && !candidate.nuisance.grasp_stiffness)
       held.push_back({"grasp_stiffness", rigid_pads, {kSoftPads, rigid_pads}, false});
   }
   add_bound("start_yaw", yaw);

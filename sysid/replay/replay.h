@@ -40,7 +40,7 @@ struct ReplaySettings {
 };
 
 /// Stiffness of pads that do not give way [N/m^3].
-inline constexpr double rigid_pads = 1e15;
+inline constexpr double rigid_pads = 1e12;
 
 /// How the sheet lay and how it was grasped: what the recording leaves open and what changes the motion.
 struct ReplayNuisance {

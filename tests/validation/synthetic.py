@@ -11,7 +11,7 @@ ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.025:0.00625:alternating
                               "bending_rigidity": 2e-4, "friction": 0.3}}
 WEIGHED = ("--hold", f"areal_density={ASSET['mechanical_props']['areal_density']}:measured")
 # A clamp of a testing machine, of which size and stiffness are known.
-CLAMPED = ("--hold", "grasp_size=0.0501:measured", "--hold", "grasp_stiffness=1e15:measured")
+CLAMPED = ("--hold", "grasp_size=0.0501:measured", "--hold", "grasp_stiffness=1e12:measured")
 STRIP = "sheet:0.2x0.025:"
 LIFT = ("--kind", "corner_lift", "--displacement=-0.03,0,0.06", "--duration", "0.8", "--rate", "20", "--grasp-within", "0.0501",
         "--clamp-slopes", "--camera", "0.1,-0.35,0.3", "--camera", "0.35,0.3,0.3", "--resolution", "64x48", "--noise", "0.001")
