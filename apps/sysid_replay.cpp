@@ -18,6 +18,7 @@
 #include "sim/newton/accepted.h"
 #include "sysid/observe/horizon.h"
 #include "sysid/observe/registration_parameter.h"
+#include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/identified_recording.h"
 #include "sysid/report/overlay.h"
@@ -171,7 +172,14 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
       sysid::identified_recording(asset, data::recording_sha256(recording));
   if (identified && !options.no_horizon) keep_predictable(*identified, options.common, replay);
 
-  const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
+  sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
+  if (identified && identified->grasp_size && !candidate.nuisance.grasp_size &&
+      sysid::grasp_size(replay.recording, replay.settings)) {
+    candidate.nuisance.grasp_size = identified->grasp_size;
+    say(options.common, replay.recording.name + ": the patch is " +
+                            data::format_short(1e3 * *identified->grasp_size) +
+                            " mm, as the search behind the asset found; --hold grasp_size=... replaces that");
+  }
   sysid::ReplayResult motion;
   sysid::run(replay, {candidate}, options.every_step ? every_step(replay) : scored_steps(replay),
              [&](std::size_t, sysid::ReplayResult result) { motion = std::move(result); });

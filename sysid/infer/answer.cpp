@@ -211,6 +211,7 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
   answer.estimate = score_motions(task.replays, answer.motions, task.grid.score);
   answer.estimate.values = answer.values;
   answer.fit = fit_of(task, concluded.found, answer);
+  answer.grasp_size = candidate_at(answer.values, task.grid).nuisance.grasp_size;
   if (!alone.empty()) answer.agreement = agreement_about(task, concluded.found, answer, alone, held);
   return concluded;
 }

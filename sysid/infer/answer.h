@@ -48,6 +48,8 @@ struct Answer {
   std::vector<std::optional<Horizon>> horizons;  ///< of each recording
   bool by_points = false;  ///< of motions too abrupt to interpolate: intervals reach to the values next to
                            ///< the likely ones (up_to_neighbours)
+  std::optional<double> grasp_size;  ///< about which the answer is, where it is told to be another than was
+                                     ///< assumed [m]
   std::vector<std::string> warnings;
   std::vector<std::string> contradicted;  ///< what was held and the recordings contradict; mostly none
 };

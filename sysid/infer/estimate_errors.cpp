@@ -156,6 +156,18 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
   return errors;
 }
 
+namespace {
+
+/// `asked`, `spread`: standard deviations of what was assumed.
+std::string grasp_text(const HeldParameter& held, double asked, double spread) {
+  const auto mm = [](double size) { return data::format_short(std::round(1e5 * size) / 100) + " mm"; };
+  const double told = held.nearer(asked < 0 ? 0 : 1, std::abs(asked));
+  return "the recordings tell that the grasp holds " + mm(told) + " of the sheet, give or take " +
+         mm(spread * 0.5 * (held.values[1] - held.values[0])) + ": the answer is about that";
+}
+
+}  // namespace
+
 void warn_of_held(const Task& task, const std::vector<double>& values, const MotionLikelihood& likelihood,
                   const std::vector<KnownError>& errors, std::vector<std::string>& warnings) {
   for (const HeldParameter& held : held_of(task, values))
@@ -166,7 +178,10 @@ void warn_of_held(const Task& task, const std::vector<double>& values, const Mot
                          "=VALUE:measured), or take a shorter --time-step");
   for (std::size_t e = 0; e < errors.size(); ++e)
     for (const HeldParameter& held : held_parameters(task.grid, task.replays, values))
-      if (errors[e].name == held.name && likelihood.spread_of(e) < kFarBetter)
+      if (errors[e].name == "grasp_size" && held.name == errors[e].name &&
+          likelihood.spread_of(e) < kFarBetter)
+        warnings.push_back(grasp_text(held, likelihood.asked_of(e), likelihood.spread_of(e)));
+      else if (errors[e].name == held.name && likelihood.spread_of(e) < kFarBetter)
         warnings.push_back(held.name +
                            (task.grid.deviations.contains(held.name)
                                 ? " is told by the recordings far better than was stated"

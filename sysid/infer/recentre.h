@@ -7,7 +7,7 @@
 namespace flash::sysid {
 
 /// The size of the grasp that the recordings tell, where it is far from that at which motions were simulated:
-/// by more than a third of what it was assumed to be known to. A patch three millimetres smaller makes D a
+/// by more than a tenth of what it was assumed to be known to. A patch three millimetres smaller makes D a
 /// third higher, which a linear error about the wrong size does not follow. [m]; empty where it is near, or
 /// not told.
 std::optional<double> told_grasp_size(const Task& task, const Found& found);

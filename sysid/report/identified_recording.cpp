@@ -23,7 +23,8 @@ std::optional<IdentifiedRecording> identified_recording(const data::Asset& asset
   const nlohmann::json recordings = of("recordings"), verdicts = of("identifiable");
   for (const nlohmann::json& recording : recordings) {
     if (!recording.is_object() || recording.value("sha256", nlohmann::json()) != sha256) continue;
-    IdentifiedRecording found{number_of(recording, "horizon_s"), number_of(recording, "score_m")};
+    IdentifiedRecording found{number_of(recording, "horizon_s"), number_of(recording, "score_m"),
+                              number_of(recording, "grasp_size_m")};
     if (recordings.size() == 1) {  // earlier programs kept what all have in common
       if (!found.horizon_s) found.horizon_s = number_of(identification, "horizon_s");
       if (!found.score) found.score = number_of(identification, "score_m");

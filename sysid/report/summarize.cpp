@@ -265,7 +265,9 @@ Agreement searched_alone(const Answer& answer) {
 }  // namespace
 
 Summary summarize(const GridResults& results, const Answer& answer, const std::vector<Replay>& replays,
-                  const GridSettings& settings, const AnswerSettings& asked) {
+                  const GridSettings& searched, const AnswerSettings& asked) {
+  GridSettings settings = searched;
+  if (answer.grasp_size) settings.centres = {{"grasp_size", {*answer.grasp_size}, false}};
   Summary summary;
   summary.tool_version = FLASH_VERSION;
   summary.results_digest = digest_of(results);
@@ -294,10 +296,10 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   summary.settings["score_of"] =
       on_mesh ? replays.front().recording.mesh_spec : "cells of no size (extrapolated)";
   std::map<std::string, double> nuisance;
-  for (const std::vector<Axis>* axes : {&settings.axes, &settings.fixed})
+  for (const std::vector<Axis>* axes : {&settings.axes, &settings.fixed, &settings.centres})
     for (std::size_t k = 0; k < axes->size(); ++k)
       if (!is_material((*axes)[k].name)) {
-        const double value = axes == &settings.fixed ? (*axes)[k].values.front() : answer.values[k];
+        const double value = axes == &settings.axes ? answer.values[k] : (*axes)[k].values.front();
         nuisance[(*axes)[k].name] = summary.best[(*axes)[k].name] = value;
       }
   for (const ParameterFinding& finding : answer.parameters)

@@ -305,7 +305,8 @@ def main():
     jobs = [(seed, None) for seed in seeds] + [(seed, kind.wrong[i % len(kind.wrong)]) for i, seed in enumerate(seeds)]
     jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair]
     begin = time.monotonic()
-    found = [searched(kept.Runs(options.sysid, options.out), asset, kind, *jobs[0])]  # fills the store
+    first = 0 if kind.rates else 1  # sheets of one size share motions: the first search fills the store
+    found = [searched(kept.Runs(options.sysid, options.out), asset, kind, *job) for job in jobs[:first]]
 
     def done(job):
         twin = searched(runs, asset, kind, *job)
@@ -315,11 +316,11 @@ def main():
     bounded = seeds[:options.bounds if "young" in kind.ranges and kind.searched_with else 0]  # of strips
     left = None if options.minutes is None else options.minutes - (time.monotonic() - begin) / 60
     bounds = {}
-    for _, (twin, bound) in kept.each_in_time(done, jobs[1:], options.jobs, left):
+    for _, (twin, bound) in kept.each_in_time(done, jobs[first:], options.jobs, left):
         found.append(twin)
         if bound is not None:
             bounds[twin["seed"]] = bound
-    if found[0]["seed"] in bounded:
+    if first and found[0]["seed"] in bounded:
         bounds[found[0]["seed"]] = least_spread(runs, kind, found[0])
     rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
             for twin in sorted(found, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]

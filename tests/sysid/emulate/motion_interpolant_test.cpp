@@ -51,7 +51,7 @@ struct Lift {
 TEST(TwoMeshMotions, IsTheFinerSimulationWhereThatWasMade) {
   const Lift lift;
   const MotionStore store(lift.grid.rollouts);
-  const auto model = with_finer_mesh(lift.replay, *on_half_the_cell(lift.replay),
+  const auto model = with_finer_mesh(lift.replay, on_half_the_cell(lift.replay),
                                      *motion_interpolant(lift.replay, lift.grid, store),
                                      thinned(lift.grid.axes), lift.grid, store);
   ASSERT_TRUE(model);
@@ -79,7 +79,7 @@ TEST(TwoMeshMotions, OneFinerSimulationMovesEveryMotionByWhatItHasBeyondTheOwn) 
   const MotionInterpolant own = *motion_interpolant(lift.replay, lift.grid, store);
   const std::vector<Axis> point = {{"bending", {2e-4}, true}};
   const auto model =
-      with_finer_mesh(lift.replay, *on_half_the_cell(lift.replay), own, point, lift.grid, store);
+      with_finer_mesh(lift.replay, on_half_the_cell(lift.replay), own, point, lift.grid, store);
   ASSERT_TRUE(model);
   const auto beyond = [&](double bending) {
     Motion difference = model->model.at({bending}, 1);
