@@ -201,8 +201,11 @@ bool has_grasp_size(const data::RecordedGrasp& grasp, const ReplaySettings& sett
 
 std::optional<double> grasp_size(const data::Recording& recording, const ReplaySettings& settings) {
   if (recording.is_solid()) return std::nullopt;
+  const Eigen::RowVector3d sides =
+      recording.mesh.vertices.colwise().maxCoeff() - recording.mesh.vertices.colwise().minCoeff();
   for (const data::RecordedGrasp& grasp : recording.grasps)
-    if (has_grasp_size(grasp, settings)) return size_of_patch(grasp, settings);
+    if (has_grasp_size(grasp, settings) && size_of_patch(grasp, settings) < sides.head<2>().minCoeff())
+      return size_of_patch(grasp, settings);
   return std::nullopt;
 }
 

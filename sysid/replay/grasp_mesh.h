@@ -39,7 +39,8 @@ void refine_grasps(const ReplaySettings& settings, double part, data::Recording&
 /// Whether the size of a grasp can be varied: that of a clamped patch at a corner of a sheet.
 bool has_grasp_size(const data::RecordedGrasp& grasp, const ReplaySettings& settings);
 
-/// The size of the first patch that has_grasp_size, as the settings have it [m]; empty where none has.
+/// The size of the first patch that has_grasp_size, as the settings have it [m]; empty where none has. A
+/// patch across a whole strip, as jaws of a testing machine hold it, has none: its edge is straight.
 std::optional<double> grasp_size(const data::Recording& recording, const ReplaySettings& settings);
 
 /// Makes patches at corners as large as `size` [m]. The cells move with them, in the rest shape: a vertex at

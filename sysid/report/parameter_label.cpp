@@ -20,6 +20,8 @@ ParameterLabel parameter_label(const std::string& name, bool has_thickness) {
       {"stiffness_damping", {"stiffness damping", "β", "s"}},
       {"start_yaw", {"start yaw of the sheet", "ψ", "rad"}},
       {"table_height", {"table height", "z", "m"}},
+      {"grasp_size", {"size of the grasp", "s", "m"}},
+      {"grasp_stiffness", {"stiffness of the pads", "k", "N/m³"}},
       {"grasp_depth", {"depth of the pinch", "d", "m"}},
       {"grasp_direction", {"direction of the pinch", "φ", "rad"}},
       {"grasp_pitch", {"pitch of the grasp", "θ", "rad"}}};
@@ -36,7 +38,8 @@ ParameterLabel parameter_label(const std::string& name, bool has_thickness) {
 std::string solver_check_label(const std::string& what) {
   static const std::map<std::string, std::string> labels = {
       {"estimate_itself", "simulated, not interpolated"},
-      {"double_mesh", "cells of no size, not of half"},
+      {"double_mesh", "cells of no size"},
+      {"half_sheet_cells", "all cells halved"},
       {"half_step", "half the time step"},
       {"four_times_iterations", "four times the iterations"}};
   const auto found = labels.find(what);

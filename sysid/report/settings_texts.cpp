@@ -123,6 +123,7 @@ std::map<std::string, std::string> settings_texts(const std::vector<Replay>& rep
     texts["grasp_shape"] = shapes;
     texts["grasp_within"] = replay.settings.grasp_within ? mm(*replay.settings.grasp_within) : "as recorded";
     texts["clamp_slopes"] = replay.settings.clamp_slopes ? "yes" : "no";
+    if (replay.settings.grasp_cell) texts["grasp_cell"] = mm(*replay.settings.grasp_cell);
   }
   return texts;
 }
@@ -150,6 +151,7 @@ std::vector<std::string> unlike_the_search(const data::Asset& asset,
   constexpr std::array<std::pair<const char*, const char*>, 10> kOptions = {
       {{"grasp_shape", "--grasp-shape"},
        {"grasp_within", "--grasp-within"},
+       {"grasp_cell", "--grasp-cell"},
        {"clamp_slopes", "--clamp-slopes"},
        {"time_step_s", "--time-step"},
        {"max_iterations", "--iterations"},

@@ -58,10 +58,10 @@ KINDS = {
                         "sheet:{side}x{side}:{cell}", "sheet:{side}x{side}:0.02",
                         {"bending": (5e-5, 1e-3, 9), "friction": (0.15, 0.6, 4)}, ("grasp", "pads", "depth", "weight"),
                         sides=(0.2, 0.5), rates=(2, 10), properties={"young": 100.0}),
-    "lift": Kind(synthetic.LIFT, synthetic.TRUTH, synthetic.FIT, STRIP, STRIP_WRONG, synthetic.CLAMPED, SLOPES),
+    "lift": Kind(synthetic.LIFT, synthetic.TRUTH, synthetic.FIT, STRIP, STRIP_WRONG, searched_with=SLOPES),
     # Held level by its end, lifted off the table: it hangs over as in a cantilever test.
     "drape": Kind((*moved(synthetic.LIFT, displacement="0,0,0.25"), "--rest", "0.5"), synthetic.TRUTH, synthetic.FIT, STRIP, STRIP_WRONG,
-                  synthetic.CLAMPED, SLOPES),
+                  searched_with=SLOPES),
     # Two opposite sides held, one of them drawn away, its force measured.
     "bar_pull": Kind(synthetic.BAR, synthetic.BAR_MESH, "sheet:0.3x0.3:0.025:alternating",
                      {"young": (20, 200, 5), "poisson": (0.05, 0.45, 5)}, ("damping", "weight", "depth", "clock", "diagonals"),

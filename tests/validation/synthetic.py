@@ -10,8 +10,6 @@ ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.025:0.00625:alternating
          "mechanical_props": {"areal_density": 0.2, "young": 10.0, "poisson": 0.3, "constitutive": "TRI_COROTATED",
                               "bending_rigidity": 2e-4, "friction": 0.3}}
 WEIGHED = ("--hold", f"areal_density={ASSET['mechanical_props']['areal_density']}:measured")
-# A clamp of a testing machine, of which size and stiffness are known.
-CLAMPED = ("--hold", "grasp_size=0.0501:measured", "--hold", "grasp_stiffness=1e12:measured")
 STRIP = "sheet:0.2x0.025:"
 LIFT = ("--kind", "corner_lift", "--displacement=-0.03,0,0.06", "--duration", "0.8", "--rate", "20", "--grasp-within", "0.0501",
         "--clamp-slopes", "--camera", "0.1,-0.35,0.3", "--camera", "0.35,0.3,0.3", "--resolution", "64x48", "--noise", "0.001")
@@ -50,7 +48,7 @@ def searched(runs, asset, seed):
     truth = truth_of(seed)
     recording = runs.synth(f"coverage/recording_{seed:03d}", asset, "--mesh", TRUTH, *LIFT, "--seed", str(seed), *settings(truth))
     summary = runs.grid(f"coverage/run_{seed:03d}", [recording], "--asset", asset, "--mesh", FIT, "--clamp-slopes",
-                        *axes(RANGES), *WEIGHED, *CLAMPED, "--rollouts", str(runs.out / "coverage" / "rollouts"))
+                        *axes(RANGES), *WEIGHED, "--rollouts", str(runs.out / "coverage" / "rollouts"))
     return {"seed": seed, "truth": truth, "parameters": summary["parameters"], "solver_check": summary["solver_check"]}
 
 
@@ -116,7 +114,7 @@ def lift(runs, bending, seed, relabel=None):
         recording.write_text(text)
         run += f"_{relabel}"
     return runs.grid(run, [recording], "--asset", asset, "--mesh", f"{STRIP}{cell}:alternating", "--clamp-slopes", "--bending", values,
-                     "--poisson", "0:0.45:3", "--hold", "friction=0.3:measured", *WEIGHED, *CLAMPED, "--rollouts", str(runs.out / name / "rollouts"))
+                     "--poisson", "0:0.45:3", "--hold", "friction=0.3:measured", *WEIGHED, "--rollouts", str(runs.out / name / "rollouts"))
 
 
 def bar_pull(runs, seed):

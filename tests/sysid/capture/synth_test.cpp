@@ -9,6 +9,7 @@
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/grid_search.h"
 #include "sysid/infer/answer.h"
+#include "sysid/replay/grasp_mesh.h"
 #include "sysid/report/summarize.h"
 #include "tests/data/temporary_folder.h"
 
@@ -179,6 +180,10 @@ struct LiftSearch {
     const std::size_t name = axis.find('=');
     grid.axes = {parse_axis(axis.substr(0, name), axis.substr(name + 1))};
     grid.fixed = {parse_hold("friction=0.3").axis};
+    // As recorded: another size of the grasp would explain another stiffness.
+    if (const auto size = grasp_size(replays[0].recording, replays[0].settings))
+      grid.fixed.push_back({"grasp_size", {*size}, false});
+    grid.fixed.push_back({"grasp_stiffness", {rigid_pads}, false});
     grid.rollouts = folder / "motions";
     ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), Existing::refuse);
     EXPECT_TRUE(grid_search(replays, grid, store));

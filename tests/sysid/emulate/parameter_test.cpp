@@ -48,7 +48,6 @@ TEST(Parameter, AnotherValueIsAnotherMotion) {
   const data::TemporaryFolder folder;
   Replay replay = short_lift(folder);
   for (data::RecordedGrasp& grasp : replay.recording.grasps) {
-    grasp.shape = data::GraspShape::pinch;
     grasp.depth = 0.06;  // more than a cell
   }
   const MaterialBase base{short_lift_material(), {}};
@@ -58,6 +57,9 @@ TEST(Parameter, AnotherValueIsAnotherMotion) {
       return motion_key(replay, make_candidate(base, {{parameter.name, {value}, false}}, {value}));
     };
     const double value = some_value(parameter, base);
+    const bool of_clamp = parameter.name == "grasp_size" || parameter.name == "grasp_stiffness";
+    for (data::RecordedGrasp& grasp : replay.recording.grasps)
+      grasp.shape = of_clamp ? data::GraspShape::clamp : data::GraspShape::pinch;
     EXPECT_EQ(key_at(value), key_at(value)) << parameter.name;
     EXPECT_NE(key_at(value), key_at(1.5 * value)) << parameter.name;
   }

@@ -49,11 +49,14 @@ double held_area(const data::Recording& recording) {
   return area;
 }
 
+// A vertex within a twentieth of an edge of the outline counts as on it: so much may be missing of a cell.
+constexpr double kSliver = 0.05 * 0.004 * 0.004 / 2;
+
 TEST(GraspMesh, HoldsThePatchItselfWhateverTheCells) {
   for (const char* mesh : {"sheet:0.2x0.2:0.04", "sheet:0.2x0.2:0.028", kTowel, "sheet:0.2x0.2:0.007"}) {
     data::Recording recording = towel(mesh);
     grade_towards_grasps({}, recording);
-    EXPECT_NEAR(held_area(recording), 0.02 * 0.02, 1e-10) << mesh;
+    EXPECT_NEAR(held_area(recording), 0.02 * 0.02, kSliver) << mesh;
   }
 }
 
@@ -67,7 +70,7 @@ TEST(GraspMesh, APatternIsKeptWhereItIsNamedAndNoCellIsAskedFor) {
   settings.grasp_cell = 0.004;
   grade_towards_grasps(settings, recording);
   EXPECT_GT(recording.mesh.vertices.rows(), even.rows());
-  EXPECT_NEAR(held_area(recording), 0.02 * 0.02, 1e-10);
+  EXPECT_NEAR(held_area(recording), 0.02 * 0.02, kSliver);
   settings.grasp_cell = 0;
   recording = towel(named);
   grade_towards_grasps(settings, recording);
@@ -81,7 +84,7 @@ TEST(GraspMesh, OfAFileIsRefinedAboutTheGrasp) {
   const data::Points was = recording.mesh.vertices;
   grade_towards_grasps({}, recording);
   EXPECT_GT(recording.mesh.vertices.rows(), was.rows());
-  EXPECT_NEAR(held_area(recording), 0.02 * 0.02, 1e-10);
+  EXPECT_NEAR(held_area(recording), 0.02 * 0.02, kSliver);
   Eigen::Index moved = 0;
   for (Eigen::Index i = 0; i < was.rows(); ++i)
     moved += (recording.mesh.vertices.row(i) - was.row(i)).norm() > 0;
@@ -121,7 +124,7 @@ TEST(GraspMesh, ASizeMovesTheOutlineAndLeavesTheSheet) {
     // Away from the grasp nothing moves.
     for (Eigen::Index i = 0; i < was.mesh.vertices.rows(); ++i)
       if ((was.mesh.vertices.row(i).head<2>().array() < 0.2 - 3 * std::max(size, 0.02)).all()) {
-        EXPECT_EQ(recording.mesh.vertices.row(i), was.mesh.vertices.row(i));
+        EXPECT_LT((recording.mesh.vertices.row(i) - was.mesh.vertices.row(i)).norm(), 1e-15);
       }
     for (const auto& t : recording.mesh.triangles.rowwise()) {
       const Eigen::Vector3d a = recording.mesh.vertices.row(t[1]) - recording.mesh.vertices.row(t[0]),
@@ -217,7 +220,8 @@ TEST(GraspMesh, MotionsAreSmoothInTheSize) {
     return lifted(recording, {}, nuisance);
   };
   const data::Points low = of_size(0.0195), middle = of_size(0.02), high = of_size(0.0205);
-  EXPECT_LT((middle - lifted(recording, {}, {})).rowwise().norm().maxCoeff(), 1e-9);
+  // The same places up to rounding, which steps that are solved to a thousandth of the weight pass on.
+  EXPECT_LT((middle - lifted(recording, {}, {})).rowwise().norm().maxCoeff(), 1e-6);
   const double slope = (high - low).rowwise().norm().maxCoeff(),
                bend = (high - 2 * middle + low).rowwise().norm().maxCoeff();
   EXPECT_GT(slope, 2e-4);
