@@ -148,7 +148,7 @@ std::vector<std::string> unlike_the_search(const data::Asset& asset,
     if (found != had)
       lines.push_back(option + ": found " + found + ", the search behind the asset had " + had);
   };
-  constexpr std::array<std::pair<const char*, const char*>, 10> kOptions = {
+  constexpr std::array<std::pair<const char*, const char*>, 11> kOptions = {
       {{"grasp_shape", "--grasp-shape"},
        {"grasp_within", "--grasp-within"},
        {"grasp_cell", "--grasp-cell"},

@@ -74,7 +74,7 @@ TEST_F(ImportOptionsOfAFolder, BecomeValues) {
   EXPECT_TRUE(settings.times.empty());
   EXPECT_EQ(settings.mesh_spec, "sheet:0.2x0.1:0.02");
   EXPECT_EQ(settings.mesh.vertices.rows(), 11 * 6);
-  EXPECT_DOUBLE_EQ(settings.grasp.within, 0.024);
+  EXPECT_DOUBLE_EQ(settings.grasp.within, 0.02);
   EXPECT_EQ(settings.trajectory.times, (std::vector<double>{0, 1}));
   options_.times = "rate:4:1";
   options_.within = 0.05;
