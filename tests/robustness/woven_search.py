@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 
-MESH = "sheet:0.2x0.2:0.025"
+MESH = "sheet:0.2x0.2:0.025:alternating"
 TRUTH = {"young": 100, "young_ratio": 0.4, "shear_ratio": 0.2}
 CAMERAS = ["--camera", "0.1,0.0,0.5", "--camera", "0.25,0.25,0.4", "--resolution", "96x72", "--noise", "0.001"]
 # The cells of both meshes divide the patch that the gripper takes.
