@@ -25,7 +25,7 @@ def scene(cell, **fields):
 
 def write_inputs(folder):
     for cell in (0.05, 0.004):
-        (folder / f"cloth_{cell}.json").write_text(json.dumps(program.ASSET | {"mesh": f"sheet:0.2x0.2:{cell}"}))
+        (folder / f"cloth_{cell}.json").write_text(json.dumps(program.ASSET | {"mesh": f"sheet:0.2x0.2:{cell}:alternating"}))
     far = {"hand": {"keyframes": [{"t": 0, "translation": [0, 0, 1]}], "grasps": [{"from": 0}]}}
     curved = folder / "curved.obj"
     curved.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 4 3\n")
@@ -119,7 +119,7 @@ def refusals(sim, sysid, calib):
         ([*grid, "--map", "bending"], ["--map: found 1, expected 2"]),
         ([*grid, "--share", "offset,roll"], ["--share: roll not in {offset,yaw,time-offset}"]),
         ([*grid, "--bending", "1e-4,,2e-4"], ["--bending", '"" is not a number']),
-        ([sysid, "import", "raw", "--trajectory", "none", "--mesh", "sheet:0.2x0.2:0.05", "--grasp", "vertices:1,", "-o", "out"],
+        ([sysid, "import", "raw", "--trajectory", "none", "--mesh", "sheet:0.2x0.2:0.05:alternating", "--grasp", "vertices:1,", "-o", "out"],
          ["--grasp", "vertices:1,", "whole numbers"]),
         ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "from 1e-07 to 1"]),
         ([*bench, "--young-min", "5", "--young-max", "3"], ["--young-max", "found 3", "at least the 5"]),
@@ -299,7 +299,7 @@ def check_resume(options, folder):
 def check_order(options, folder):
     """A search goes on in the order of its recordings, in whatever order they are named: to the same files."""
     second = folder / "second"
-    program.must(options.sysid, "synth", "--asset", folder / "asset.json", "--mesh", "sheet:0.2x0.2:0.05", "--duration",
+    program.must(options.sysid, "synth", "--asset", folder / "asset.json", "--mesh", "sheet:0.2x0.2:0.05:alternating", "--duration",
                  "0.6", "--seed", "2", "--noise", "0.003", "--quiet", "-o", second)
     words = ["--asset", folder / "asset.json", "--bending", "1e-5,1e-4,2e-4", "--envs", "1", "--no-solver-check",
              "--no-horizon", "--quiet"]
@@ -398,7 +398,7 @@ def check_seams(options, folder):
 def check_fit(options, folder):
     """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
     recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
-    mesh = ["--mesh", "sheet:0.2x0.2:0.04"]  # that of the recording has cells of 0.05
+    mesh = ["--mesh", "sheet:0.2x0.2:0.04:alternating"]  # that of the recording has cells of 0.05
     program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "1e-5:1e-3:9:log", *mesh,
                  "--no-solver-check", "--no-horizon", "--no-plan", "--quiet", "-o", run)
     line = [options.sysid, "fit", recording, "--start", run, "--no-solver-check", "--no-horizon", "--no-plan", "--quiet"]
@@ -447,13 +447,13 @@ def check_tuned(options, folder):
     program.must(options.sysid, "export", run, "--asset", asset, "--quiet", "-o", tuned)
     score = json.loads(tuned.read_text())["identification"]["score_m"]
     replay = [options.sysid, "replay", recording, "--asset", tuned, "--json", "--force", "-o", folder / "of_tuned"]
-    mesh = ["--mesh", "sheet:0.2x0.2:0.04"]
+    mesh = ["--mesh", "sheet:0.2x0.2:0.04:alternating"]
     done = program.must(*replay, *mesh)
     found = json.loads(done.stdout)["score"]
     yield abs(found - score) <= 1e-9, f"replay of the tuned asset: score {found}, the asset has {score}"
     yield "behind the asset" not in done.stderr, f"replay as searched: {done.stderr}"
     done = program.must(*replay)
-    yield ("--mesh: found sheet:0.2x0.2:0.05 (25 vertices), the search behind the asset had sheet:0.2x0.2:0.04" in done.stderr,
+    yield ("--mesh: found sheet:0.2x0.2:0.05:alternating (25 vertices), the search behind the asset had sheet:0.2x0.2:0.04:alternating" in done.stderr,
            f"replay on another mesh: {done.stderr}")
     done = program.must(*replay, *mesh, "--grasp-shape", "point", "--time-step", "0.005")
     for words in ("--grasp-shape: found point, the search behind the asset had clamp",

@@ -69,7 +69,7 @@ def write_hand_eye(folder):
 def outputs(options, folder):
     """Name and text of each JSON, and the exit codes that are right with it."""
     asset, recording = program.synthesize(options.sysid, folder)
-    synth = [options.sysid, "synth", "--asset", asset, "--mesh", "sheet:0.2x0.2:0.05", "--kind", "corner_lift",
+    synth = [options.sysid, "synth", "--asset", asset, "--mesh", "sheet:0.2x0.2:0.05:alternating", "--kind", "corner_lift",
              "--duration", "0.6"]
     axes = ["--bending", "5e-5:5e-4:3:log", "--no-solver-check", "--no-horizon"]
     (folder / "scene.json").write_text(json.dumps(

@@ -194,9 +194,9 @@ def verbs(sysid, sim):
             "resume": lambda f: [sysid, "grid", f / "recording", "--asset", f / "asset.json", "--bending",
                                  "5e-5,1e-4,2e-4", "--no-solver-check", "--no-horizon", "--resume", "-o", f / "run"],
             "import": lambda f: [sysid, "import", f / "recording" / "frames", "--trajectory",
-                                 f / "recording" / "gripper.tum", "--times", f / "times.csv", "--mesh", "sheet:0.2x0.2:0.05", "-o", f / "out"],
+                                 f / "recording" / "gripper.tum", "--times", f / "times.csv", "--mesh", "sheet:0.2x0.2:0.05:alternating", "-o", f / "out"],
             **{" ".join(options): lambda f, options=options: [
-                sysid, "import", f / "recording" / "frames", "--trajectory", f / "recording" / "gripper.tum", "--mesh", "sheet:0.2x0.2:0.05", "-o", f / "out", *options] for options in IMPORT_OPTIONS},
+                sysid, "import", f / "recording" / "frames", "--trajectory", f / "recording" / "gripper.tum", "--mesh", "sheet:0.2x0.2:0.05:alternating", "-o", f / "out", *options] for options in IMPORT_OPTIONS},
             **{" ".join(("segment", *options)): lambda f, options=options: [
                 sysid, "segment", f / "view", "-o", f / "out", *(str(word).replace("{}", str(f)) for word in options)]
                for options in SEGMENT_OPTIONS}}

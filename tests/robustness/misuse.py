@@ -216,7 +216,7 @@ def check_places(options, folder):
         for words in (["fit", *search, "--start", "run"], ["replay", *search], ["plan", *search],
                       ["grid", *search, "--bending", "1e-4,2e-4"], ["synth", "--asset", "cloth.json"],
                       ["segment", "view"], ["export", "run"], ["report", "run"],
-                      ["import", "recording/frames", "--trajectory", "recording/gripper.tum", "--mesh", "sheet:0.2x0.2:0.05"]):
+                      ["import", "recording/frames", "--trajectory", "recording/gripper.tum", "--mesh", "sheet:0.2x0.2:0.05:alternating"]):
             yield from refused(options, folder, [options.sysid, *words, "-o", place], place, *expected)
         yield from refused(options, folder, [options.sim, "run", "slow.json", "-o", place], place, *expected)
         if options.calib:  # the dataset is none, which is found later
@@ -235,7 +235,7 @@ def check_places(options, folder):
 def check_calibration(options, folder):
     """--force takes a camera that cannot be used; what stands on it says so, to the report."""
     words = [options.sysid, "import", "--depth", "view/depth", "--intrinsics", "view/camera_info.yaml", "--trajectory",
-             "gripper.tum", "--times", "rate:2", "--mesh", "sheet:0.2x0.2:0.05", "--table-z", "0"]
+             "gripper.tum", "--times", "rate:2", "--mesh", "sheet:0.2x0.2:0.05:alternating", "--table-z", "0"]
     yield from refused(options, folder, [*words, "--extrinsics", "unusable.json", "-o", "lift"], "unusable.json",
                        "exit_code", "one axis only", "--force")
     expected = ["flash-calib handeye ended with exit code 3, an answer that cannot be used", "one axis only", "second"]
@@ -264,7 +264,7 @@ def check_calibration(options, folder):
 
 def check_guess(options, folder):
     """A table height that was guessed wrong lets the gripper miss the sheet; one that was given was not guessed."""
-    words = [options.sysid, "import", "recording/frames", "--trajectory", "high.tum", "--times", "rate:10", "--mesh", "sheet:0.2x0.2:0.05", "--quiet", "-o", "out"]
+    words = [options.sysid, "import", "recording/frames", "--trajectory", "high.tum", "--times", "rate:10", "--mesh", "sheet:0.2x0.2:0.05:alternating", "--quiet", "-o", "out"]
     for guess, crop in (("0", "0:"), ("-0.1", "-0.1:")):
         yield from refused(options, folder, [*words, f"--crop-z={crop}"], "gripper", "should hold",
                            f"guessed as {guess} m", "--table-z")

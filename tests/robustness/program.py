@@ -2,7 +2,7 @@
 import json
 import subprocess
 
-ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.2:0.05", "element_type": "TRIANGLE",
+ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.2:0.05:alternating", "element_type": "TRIANGLE",
          "mechanical_props": {"areal_density": 0.2, "thickness": 0.001, "young": 5e4, "poisson": 0.3,
                               "constitutive": "TRI_COROTATED", "bending_rigidity": 1e-4, "friction": 0.3}}
 
@@ -22,6 +22,6 @@ def synthesize(sysid, folder, *options):
     """An asset and a recording of it, a short corner lift."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "asset.json").write_text(json.dumps(ASSET, indent=1))
-    must(sysid, "synth", "--asset", folder / "asset.json", "--kind", "corner_lift", "--mesh", "sheet:0.2x0.2:0.05",
+    must(sysid, "synth", "--asset", folder / "asset.json", "--kind", "corner_lift", "--mesh", "sheet:0.2x0.2:0.05:alternating",
          "--duration", "0.6", "--seed", "1", "--quiet", *options, "-o", folder / "recording")
     return folder / "asset.json", folder / "recording"

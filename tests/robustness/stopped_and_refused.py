@@ -52,7 +52,7 @@ def stops(sysid, root, asset, recording, run):
         "replay": [recording, *common, *LONG],
         "fit": [recording, *common, "--start", run, *LONG],
         "plan": [recording, *common, "--time-step", "4e-6"],
-        "synth": [*common, "--duration", "0.6", "--mesh", "sheet:0.2x0.2:0.02", "--time-step", "3e-6"],
+        "synth": [*common, "--duration", "0.6", "--mesh", "sheet:0.2x0.2:0.02:alternating", "--time-step", "3e-6"],
     }
     for verb, words in jobs.items():
         out = root / f"stopped_{verb}"
@@ -113,7 +113,7 @@ def plans(sysid, root, asset):
     scratch.mkdir()
     environment = {**os.environ, "TMPDIR": str(scratch)}
     made = root / "even"
-    program.must(sysid, "synth", "--asset", asset, "--mesh", "sheet:0.2x0.2:0.04", "--duration", "0.2", "--quiet",
+    program.must(sysid, "synth", "--asset", asset, "--mesh", "sheet:0.2x0.2:0.04:alternating", "--duration", "0.2", "--quiet",
                  "-o", made)
     words = [sysid, "plan", made, "--asset", asset, "--bending", "1e-5,1e-4", "--time-step", "0.02"]
     done = program.call(*words, "-o", root / "plan.json", env=environment)
