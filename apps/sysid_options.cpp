@@ -15,7 +15,9 @@
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
 #include "data/error.h"
+#include "data/mesh_io.h"
 #include "data/message_line.h"
+#include "data/procedural_mesh.h"
 #include "data/recording_digest.h"
 #include "data/seams.h"
 #include "data/text.h"
@@ -294,7 +296,10 @@ void warn_of_camera(const data::Recording& recording) {
 
 void warn_of_seams(const data::Recording& recording) {
   if (recording.is_solid()) return;
-  const std::string seams = data::seam_warning(recording.mesh);
+  // Of a file as it stands, not as it is refined about a grasp.
+  const bool of_file = !recording.mesh_spec.empty() && !data::is_made_on_the_spot(recording.mesh_spec);
+  const std::string seams =
+      data::seam_warning(of_file ? data::load_triangle_mesh(recording.mesh_spec) : recording.mesh);
   if (!seams.empty()) warn(recording.name + ": " + recording.mesh_spec + ": " + seams);
 }
 

@@ -17,7 +17,7 @@ struct NewtonWorkspace {
   std::unique_ptr<LayerMemory> layers;  ///< made where the surface first meets itself
   bool refactor = true;  ///< whether the next solve needs a new factor: none yet, or the sheet has moved on
   data::Points factored_springs;  ///< those that the factor knows, as IncrementalPotential tells them
-  Iterate now;           ///< where the iteration stands; between steps the end of the last one
+  Iterate now;                    ///< where the iteration stands; between steps the end of the last one
   // These members stay between steps to reuse their memory.
   Iterate trial, longer;
   BlockValues<double> values;

@@ -96,8 +96,8 @@ struct ContactSet {
   }
 };
 
-/// The vertices that the environment's holds carry rigidly; moves them to where they have to be at the end of the
-/// step.
+/// The vertices that the environment's holds carry rigidly; moves them to where they have to be at the end of
+/// the step.
 ContactSet begin_step(const ContactStep& step, data::Points& positions);
 
 /// Adds what holds exert on a vertex under `reaction` [N] to the forces of the holds that it obeys.

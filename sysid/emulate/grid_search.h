@@ -22,7 +22,8 @@ struct GridSettings {
   MaterialBase base;
   std::vector<Axis> axes;   ///< searched; the last runs fastest
   std::vector<Axis> fixed;  ///< one value each
-  /// One value each: of what is held and not known, where recordings tell that it is another than was assumed.
+  /// One value each: of what is held and not known, where recordings tell that it is another than was
+  /// assumed.
   std::vector<Axis> centres = {};
   std::map<std::string, double> deviations =
       {};  ///< standard deviation of what is held, where one was stated

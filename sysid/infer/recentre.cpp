@@ -14,7 +14,7 @@ constexpr const char* kSize = "grasp_size";
 
 std::optional<double> told_grasp_size(const Task& task, const Found& found) {
   constexpr double kFar = 0.1, kTold = 0.5;  // standard deviations of what was assumed
-  constexpr double kMost = 2;                    // at a time
+  constexpr double kMost = 2;                // at a time
   const auto error = std::find_if(found.errors.begin(), found.errors.end(),
                                   [](const KnownError& each) { return each.name == kSize; });
   if (error == found.errors.end()) return std::nullopt;

@@ -25,8 +25,9 @@ void check_grasps_act(const Replay& replay);
 std::shared_ptr<const sim::Schedule> gripper_schedule(const Replay& replay);
 
 /// A grasp of the recording as it is simulated: its patch, when it closes and where it takes the vertices.
-/// clamp: where the sheet lies, by springs where the nuisance has a grasp_stiffness. point: the vertex nearest the corner alone. pinch: folded to a ridge.
-/// `frame`: of the gripper in replay.schedule. `flat`: the sheet as it lies before the table is raised [m].
+/// clamp: where the sheet lies, by springs where the nuisance has a grasp_stiffness. point: the vertex
+/// nearest the corner alone. pinch: folded to a ridge. `frame`: of the gripper in replay.schedule. `flat`:
+/// the sheet as it lies before the table is raised [m].
 sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, int frame,
                     const ReplayNuisance& nuisance, const data::Points& flat);
 

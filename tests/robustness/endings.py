@@ -398,7 +398,7 @@ def check_seams(options, folder):
 def check_fit(options, folder):
     """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
     recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
-    mesh = ["--mesh", "sheet:0.2x0.2:0.04:alternating"]  # that of the recording has cells of 0.05
+    mesh = ["--mesh", "sheet:0.2x0.2:0.025:alternating"]  # that of the recording has cells of 0.05
     program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "1e-5:1e-3:9:log", *mesh,
                  "--no-solver-check", "--no-horizon", "--no-plan", "--quiet", "-o", run)
     line = [options.sysid, "fit", recording, "--start", run, "--no-solver-check", "--no-horizon", "--no-plan", "--quiet"]
@@ -447,13 +447,13 @@ def check_tuned(options, folder):
     program.must(options.sysid, "export", run, "--asset", asset, "--quiet", "-o", tuned)
     score = json.loads(tuned.read_text())["identification"]["score_m"]
     replay = [options.sysid, "replay", recording, "--asset", tuned, "--json", "--force", "-o", folder / "of_tuned"]
-    mesh = ["--mesh", "sheet:0.2x0.2:0.04:alternating"]
+    mesh = ["--mesh", "sheet:0.2x0.2:0.025:alternating"]
     done = program.must(*replay, *mesh)
     found = json.loads(done.stdout)["score"]
     yield abs(found - score) <= 1e-9, f"replay of the tuned asset: score {found}, the asset has {score}"
     yield "behind the asset" not in done.stderr, f"replay as searched: {done.stderr}"
     done = program.must(*replay)
-    yield ("--mesh: found sheet:0.2x0.2:0.05:alternating (25 vertices), the search behind the asset had sheet:0.2x0.2:0.04:alternating" in done.stderr,
+    yield ("--mesh: found sheet:0.2x0.2:0.05:alternating (25 vertices), the search behind the asset had sheet:0.2x0.2:0.025:alternating" in done.stderr,
            f"replay on another mesh: {done.stderr}")
     done = program.must(*replay, *mesh, "--grasp-shape", "point", "--time-step", "0.005")
     for words in ("--grasp-shape: found point, the search behind the asset had clamp",
