@@ -30,6 +30,7 @@ struct Emulator {
   std::vector<ModelledReplay> models;  ///< one a recording
   double share = 0;                    ///< see TwoMeshMotions
   std::size_t first = 0;               ///< recording of the search that the first is of
+  std::vector<Axis> finer = {};        ///< values at which the finer mesh was simulated; empty: at none
 };
 
 /// Modelled motions at values inside the range, one a recording; `share`: see TwoMeshMotions.

@@ -69,6 +69,15 @@ std::vector<Replay> finer_replays(const std::vector<Replay>& replays, const Answ
   return settings.solver_check ? on_half_the_cell(replays) : std::vector<Replay>();
 }
 
+/// Values of a first emulator at which the finer mesh is simulated: those of the best candidate alone where
+/// motions about the answer follow, which have their own; else every other one.
+std::vector<Axis> first_on_finer_mesh(std::vector<Axis> axes, const std::vector<Axis>& ranges,
+                                      const std::vector<double>& best) {
+  if (most_motions(ranges).second == 0) return thinned(axes);
+  for (std::size_t k = 0; k < axes.size(); ++k) axes[k].values = {best[k]};
+  return axes;
+}
+
 /// Friction, weight, a stiffness, size and pads of a clamp or two angles of a pinch, start yaw and table
 /// height, and what was stated with a deviation.
 std::size_t most_held(const GridSettings& grid) { return 7 + grid.deviations.size(); }
@@ -278,7 +287,7 @@ AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solv
   std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) + most_horizon_motions(grid) +
                         most_motions_alone(recordings, 2 * many_motions(grid.axes)) +
                         lattice_rounds * (own + motions_at_estimate + (solver_check ? finer : 0));
-  if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
+  if (solver_check) motions += own > 0 ? 1 : cartesian_product(thinned(most_focused(grid.axes))).size();
   const int alone = recordings > 1 ? 2 * static_cast<int>(recordings) : 0,
             looks = 2 * (own > 0 ? 1 + lattice_rounds : 1);
   return {static_cast<int>(recordings * motions),
@@ -313,7 +322,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   const OtherCells cells = settings.solver_check ? other_cells(replays) : OtherCells();
   const Task task{replays, finer, usable, ranges, settings, store, told, &cells};
   std::optional<Emulator> emulator;
-  if (settings.solver_check) emulator = emulator_over(task, usable.axes, thinned(usable.axes), false);
+  if (settings.solver_check)
+    emulator = emulator_over(task, usable.axes, first_on_finer_mesh(usable.axes, ranges, best), false);
   if (!emulator) emulator = emulator_over(task, usable.axes, {}, false);
   std::optional<Found> found;
   std::vector<KnownError> held;

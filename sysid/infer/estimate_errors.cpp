@@ -79,7 +79,7 @@ constexpr const char* half_step_name = "half_step";
 }  // namespace
 
 void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior& posterior,
-                    const std::vector<FinerSettings>& finer, bool with_held) {
+                    const std::vector<FinerSettings>& finer, bool with_held, bool with_cells) {
   const std::vector<double> values = posterior.values();
   const ReplayCandidate candidate = candidate_at(values, task.grid);
   std::vector<WantedMotion> wanted = wanted_at(task, emulator, candidate);
@@ -88,12 +88,10 @@ void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior&
     for (const Replay& replay : each.replays) wanted.push_back({&replay, candidate});
     if (each.what == half_step_name) of_draws = &each.replays;
   }
-  if (with_held) {
-    add_wanted(task, held_of(task, values), values, wanted);
-    if (task.cells != nullptr)
-      for (const std::vector<Replay>* replays : {&task.cells->of_sheet, &task.cells->between})
-        for (const Replay& replay : *replays) wanted.push_back({&replay, candidate});
-  }
+  if (with_held) add_wanted(task, held_of(task, values), values, wanted);
+  if (with_cells && task.cells != nullptr)
+    for (const std::vector<Replay>* replays : {&task.cells->of_sheet, &task.cells->between})
+      for (const Replay& replay : *replays) wanted.push_back({&replay, candidate});
   for (const std::vector<double>& draw : draws_of(posterior))
     for (const Replay& replay : *of_draws) wanted.push_back({&replay, candidate_at(draw, task.grid)});
   task.store.prepare(wanted);

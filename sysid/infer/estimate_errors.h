@@ -44,10 +44,10 @@ struct Estimate {
 
 std::vector<Replay> replays_of(const Emulator& emulator);
 
-/// Simulates side by side what solve_at, errors_at_draws and, `with_held`, errors_of_held ask for about a
-/// posterior.
+/// Simulates side by side what solve_at, errors_at_draws and, `with_held` and `with_cells`, errors_of_held
+/// and errors_of_cells ask for about a posterior.
 void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior& posterior,
-                    const std::vector<FinerSettings>& finer, bool with_held);
+                    const std::vector<FinerSettings>& finer, bool with_held, bool with_cells);
 
 /// By what is held and not measured, about an estimate: how the motion changes with it, and how that bends.
 /// Where a motion diverges one nearer is taken, down to an eighth of the way, or the other side alone, and

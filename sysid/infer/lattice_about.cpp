@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string>
 
@@ -30,7 +31,7 @@ std::size_t many_motions(const std::vector<Axis>& axes) {
 
 std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
                                       const std::vector<Axis>& finer, bool told_own) {
-  Emulator emulator{{}, finer.empty() ? own_mesh : no_cells};
+  Emulator emulator{{}, finer.empty() ? own_mesh : no_cells, 0, finer};
   GridSettings grid = task.grid;
   grid.axes = axes;
   const std::function<void()> motion = [&] { task.tell_motion(); };
@@ -58,14 +59,16 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   const Look first = look(extent, at);
   std::vector<FinerSettings> finer;
   if (task.settings.solver_check) finer = finer_settings(task.replays);
-  simulate_ahead(task, emulator, first.posterior, finer, held.empty());
+  const bool knows_cells = std::any_of(held.begin(), held.end(), is_of_cells),
+             knows_held = !std::all_of(held.begin(), held.end(), is_of_cells);
+  simulate_ahead(task, emulator, first.posterior, finer, !knows_held, !knows_cells);
   std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values(), std::move(finer));
   if (!estimate) return std::nullopt;
-  if (held.empty()) {
-    held = errors_of_held(task, first.posterior.values(), estimate->motions);
-    for (KnownError& error : errors_of_cells(task, emulator, first.posterior.values(), estimate->motions))
-      held.push_back(std::move(error));
-  }
+  const auto add_to_held = [&](std::vector<KnownError> more) {
+    std::move(more.begin(), more.end(), std::back_inserter(held));
+  };
+  if (!knows_held) add_to_held(errors_of_held(task, first.posterior.values(), estimate->motions));
+  if (!knows_cells) add_to_held(errors_of_cells(task, emulator, first.posterior.values(), estimate->motions));
   errors = estimate->errors;
   errors.insert(errors.end(), held.begin(), held.end());
   for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
@@ -175,7 +178,7 @@ Extent both(Extent a, const Extent& b) {
 Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held) {
   const bool finer = found.emulator.share != own_mesh;
   Extent extent = next_lattice(extent_of(found.axes), found.look.posterior, task.ranges);
-  if (!reaches_beyond(extent, found.axes) &&
+  if (!reaches_beyond(extent, found.axes) && !reaches_beyond(extent, found.emulator.finer) &&
       !is_finer(lattice(extent, task.ranges, 3, few_motions(task.ranges)), found.axes) &&
       !misses_much(task, found))
     return found;

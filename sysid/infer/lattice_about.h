@@ -36,7 +36,8 @@ struct Found {
 };
 
 /// Looks twice: for the estimate, and again with what solving it says of errors. `held`: errors by what is
-/// held, found at the first estimate. Empty where the estimate diverges.
+/// held and of the cells, found at the first estimate unless they are there already. Empty where the estimate
+/// diverges.
 std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
                                const Extent& extent, const std::vector<double>& at,
                                std::vector<KnownError> errors, std::vector<KnownError>& held);

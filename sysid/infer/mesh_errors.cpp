@@ -36,6 +36,10 @@ KnownError error_of(const char* name, std::shared_ptr<const Motions> from, Motio
 
 }  // namespace
 
+bool is_of_cells(const KnownError& error) {
+  return error.name == half_sheet_cells || error.name == unsettled_cells;
+}
+
 double observed_ratio(const std::vector<ReplayResult>& cells, const std::vector<ReplayResult>& halves,
                       const std::vector<ReplayResult>& quarters) {
   double first = 0, second = 0;

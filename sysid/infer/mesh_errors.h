@@ -17,6 +17,8 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here);
 
+bool is_of_cells(const KnownError& error);
+
 /// How differences between motions fall as cells are halved, and halved again: |x_4 - x_2| / |x_2 - x_1|,
 /// over the vertices that all three meshes have, the first ones. An error of first order falls to 1/2, of
 /// second order to 1/4. One motion a recording.

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "sysid/infer/held.h"
+#include "sysid/infer/mesh_errors.h"
 
 namespace flash::sysid {
 namespace {
@@ -37,7 +39,9 @@ Found about_told_grasp(const Task& task, Found found, GridSettings& grid, std::v
     if (!size) break;
     const std::vector<Axis> before = grid.centres;
     grid.centres = {{kSize, {*size}, false}};
+    // What smaller cells change hardly depends on the size, and takes the longest.
     std::vector<KnownError> here;
+    std::copy_if(held.begin(), held.end(), std::back_inserter(here), is_of_cells);
     std::optional<Found> there = look_about(task, extent_of(found.look.posterior.axes),
                                             found.look.posterior.values(), finer, {}, here);
     if (!there) {

@@ -272,8 +272,14 @@ void MotionStore::prepare(const std::vector<WantedMotion>& wanted) const {
     if (!std::filesystem::exists(path_of(key))) batches[motion.replay].push_back(motion.candidate);
   }
   if (batches.empty()) return;
-  const std::vector<std::pair<const Replay*, std::vector<ReplayCandidate>>> all(batches.begin(),
-                                                                                batches.end());
+  std::vector<std::pair<const Replay*, std::vector<ReplayCandidate>>> all(batches.begin(), batches.end());
+  const auto work = [](const auto& batch) {
+    const Replay& replay = *batch.first;
+    return static_cast<double>(batch.second.size()) * static_cast<double>(replay.surface.vertices.rows()) /
+           replay.settings.solver.time_step;
+  };
+  // The longest first, or all wait for it.
+  std::sort(all.begin(), all.end(), [&](const auto& a, const auto& b) { return work(a) > work(b); });
   data::for_each_in_parallel(all.size(), all.front().first->settings.threads, [&](std::size_t k) {
     run(*all[k].first, all[k].second, [](std::size_t, const ReplayResult&) {});
   });
