@@ -29,10 +29,16 @@ double squared_difference(const Motion& a, const Motion& b, Eigen::Index vertice
   return sum;
 }
 
-KnownError error_of(const char* name, std::shared_ptr<const Motions> from, Motions to, bool corrects) {
-  return {
-      {{-1, std::move(from)}, {1, std::make_shared<const Motions>(std::move(to))}}, true, corrects, {}, name};
+KnownError error_of(const char* name, std::shared_ptr<const Motions> from, Motions to, bool corrects,
+                    double times = 1) {
+  return {{{-times, std::move(from)}, {times, std::make_shared<const Motions>(std::move(to))}},
+          true,
+          corrects,
+          {},
+          name};
 }
+
+constexpr double kSecondOrder = 4.0 / 3;  // the way to cells of no size over that to cells of half the size
 
 }  // namespace
 
@@ -56,15 +62,19 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
                                         const std::vector<ReplayResult>& here) {
   if (task.cells == nullptr || task.cells->of_sheet.empty()) return {};
   std::vector<KnownError> errors;
-  const auto from = std::make_shared<const Motions>(Motions{task.replays, here});
+  const auto between = std::make_shared<const Motions>(
+      Motions{task.cells->between, motions_on(task, task.cells->between, values)});
+  if (between->results.empty()) return {};
+  // Both have the same cells at the grasp, whose error is that of the finer mesh.
   if (auto halved = motions_on(task, task.cells->of_sheet, values); !halved.empty())
-    errors.push_back(error_of(half_sheet_cells, from, {task.cells->of_sheet, std::move(halved)}, true));
+    errors.push_back(
+        error_of(half_sheet_cells, between, {task.cells->of_sheet, std::move(halved)}, true, kSecondOrder));
   if (emulator.share == own_mesh) return errors;
   const std::vector<Replay> on_finer = replays_of(emulator);
   std::vector<ReplayResult> finer = motions_on(task, on_finer, values);
-  const std::vector<ReplayResult> between = motions_on(task, task.cells->between, values);
-  if (!finer.empty() && !between.empty() && observed_ratio(here, between, finer) > most_ratio)
-    errors.push_back(error_of(unsettled_cells, from, {on_finer, std::move(finer)}, false));
+  if (!finer.empty() && observed_ratio(here, between->results, finer) > most_ratio)
+    errors.push_back(error_of(unsettled_cells, std::make_shared<const Motions>(Motions{task.replays, here}),
+                              {on_finer, std::move(finer)}, false));
   return errors;
 }
 

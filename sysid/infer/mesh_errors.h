@@ -10,9 +10,9 @@ namespace flash::sysid {
 /// smaller cells there alone. `here`: the estimate on the search's own mesh, one motion a recording. Empty
 /// where the task has no other cells; what diverged is left out.
 ///
-/// "half_sheet_cells": by what half of all cells moves it; motions are corrected by that.
-/// "unsettled_cells": the way to the finer mesh as a whole, where differences do not fall as the
-/// extrapolation to cells of no size assumes (observed_ratio above most_ratio).
+/// "half_sheet_cells": by what half of the cells of the sheet moves it, those at the grasps apart; motions
+/// are corrected by that. "unsettled_cells": the way to the finer mesh as a whole, where differences do not
+/// fall as the extrapolation to cells of no size assumes (observed_ratio above most_ratio).
 std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulator,
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here);

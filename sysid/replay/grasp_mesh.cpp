@@ -17,8 +17,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kFiner = 5;   // cells of a mesh, or a patch, over those at a grasp
-constexpr double kFinest = 8;  // those over the cells at a corner of the patch
+constexpr double kFiner = 5;     // cells of a mesh, or a patch, over those at a grasp
+constexpr double kStraight = 2;  // likewise at a straight edge across the sheet, where nothing is singular
+constexpr double kFinest = 8;    // cells at a grasp over those at a corner of the patch
 
 /// Below zero inside [m].
 double box_distance(const Eigen::AlignedBox3d& box, const Vector3d& place) {
@@ -51,6 +52,18 @@ Vector3d place_at_rest(const data::Recording& recording, const Vector3d& place) 
   return recording.mesh.vertices.row(nearest).transpose();
 }
 
+/// The edge of a box, with those of its corners that lie inside the sheet.
+data::Outline box_outline(const data::Points& rest, const Eigen::AlignedBox3d& box) {
+  data::Outline outline{[box](const Vector3d& x) { return box_distance(box, x); }};
+  const Vector3d low = rest.colwise().minCoeff().transpose(), high = rest.colwise().maxCoeff().transpose();
+  const double slack = 1e-9 * (high - low).maxCoeff();
+  for (const double x : {box.min().x(), box.max().x()})
+    for (const double y : {box.min().y(), box.max().y()})
+      if (x > low.x() + slack && x < high.x() - slack && y > low.y() + slack && y < high.y() - slack)
+        outline.corners.emplace_back(x, y, low.z());
+  return outline;
+}
+
 /// The edge of a patch. `within`: its size [m].
 data::Outline patch_outline(const data::Recording& recording, const data::RecordedGrasp& grasp,
                             double within) {
@@ -67,18 +80,7 @@ data::Outline patch_outline(const data::Recording& recording, const data::Record
       outline.corners = {corner.place + within * Vector3d(corner.inwards.x(), corner.inwards.y(), 0)};
     return outline;
   }
-  if (select.box) {
-    data::Outline outline{[box = *select.box](const Vector3d& x) { return box_distance(box, x); }};
-    // Of a box through the sheet's plane those corners that lie in the sheet.
-    const Eigen::AlignedBox3d sheet(rest.colwise().minCoeff().transpose(),
-                                    rest.colwise().maxCoeff().transpose());
-    for (const double x : {select.box->min().x(), select.box->max().x()})
-      for (const double y : {select.box->min().y(), select.box->max().y()}) {
-        const Vector3d corner(x, y, sheet.min().z());
-        if (corner.allFinite() && sheet.contains(corner)) outline.corners.push_back(corner);
-      }
-    return outline;
-  }
+  if (select.box) return box_outline(rest, *select.box);
   if (select.position) {
     const Vector3d place = place_at_rest(
         recording, data::pose_at(trajectory_of(recording, grasp), grasp.from) * *select.position);
@@ -86,7 +88,7 @@ data::Outline patch_outline(const data::Recording& recording, const data::Record
   }
   Eigen::AlignedBox3d box;
   for (const int vertex : select.vertices) box.extend(rest.row(vertex).transpose());
-  return {[box](const Vector3d& x) { return box_distance(box, x); }};
+  return box_outline(rest, box);
 }
 
 /// Where a point holds the sheet.
@@ -140,7 +142,7 @@ std::vector<data::Outline> grasp_outlines(const data::Recording& recording, cons
   const double cell = data::edge_lengths(recording.mesh).mean;
   for (const data::RecordedGrasp& grasp : recording.grasps) {
     const data::GraspShape shape = shape_of(grasp, settings);
-    double size = cell;
+    double size = cell, finer = kFiner;
     if (shape == data::GraspShape::point) {
       const Vector3d point = held_point(recording, grasp);
       outlines.push_back({[point](const Vector3d& x) { return (x - point).norm(); }, 0, {point}});
@@ -148,8 +150,9 @@ std::vector<data::Outline> grasp_outlines(const data::Recording& recording, cons
       const double within = size_of_patch(grasp, settings);
       outlines.push_back(patch_outline(recording, grasp, within));
       if (grasp.select.corner || grasp.select.position) size = std::min(size, within);
+      if (outlines.back().corners.empty() && !grasp.select.position) finer = kStraight;
     }
-    outlines.back().near = settings.grasp_cell.value_or(size / kFiner);
+    outlines.back().near = settings.grasp_cell.value_or(size / finer);
     outlines.back().near_corner = outlines.back().near / kFinest;
   }
   return outlines;

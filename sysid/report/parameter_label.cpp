@@ -39,7 +39,7 @@ std::string solver_check_label(const std::string& what) {
   static const std::map<std::string, std::string> labels = {
       {"estimate_itself", "simulated, not interpolated"},
       {"double_mesh", "cells of no size"},
-      {"half_sheet_cells", "all cells halved"},
+      {"half_sheet_cells", "cells of the sheet halved"},
       {"half_step", "half the time step"},
       {"four_times_iterations", "four times the iterations"}};
   const auto found = labels.find(what);
