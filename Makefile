@@ -21,7 +21,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
-.PHONY: grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
+.PHONY: grasp-convergence grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -78,6 +78,10 @@ coverage: configure-test  ## Say whether intervals hold the truth of RUNS twins 
 agreement: configure-test  ## Say whether searches of two recordings tell one cloth from two, RUNS materials from SEED on
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/agreement.py --sysid $(sysid) --out $(BUILD)/agreement --seed $(SEED) --runs $(RUNS)
+
+grasp-convergence: configure-test  ## Say how far cells move D of a corner lift, of motions and of searches, and how far the stated size of the patch does
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/grasp_convergence.py --sysid $(sysid) --out $(BUILD)/grasp_convergence --documents docs/validation $(if $(ONLY),--only $(ONLY))
 
 grasp-shapes: configure-test  ## Say whether compare tells how strips were grasped, RUNS of them from SEED on
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid

@@ -68,21 +68,34 @@ def piercings(vertices, faces):
     return count
 
 
-def piercings_by_frame(folder, frames, size=0.278, grasp=0.06):
-    """Without the triangles within `grasp` of the grasped corner (0, 0): a pinch folds the sheet onto itself."""
+def piercings_by_frame(folder, frames, grasp=0.06):
+    """Without the triangles within `grasp` of the grasped corner: a pinch folds the sheet onto itself."""
     found = {}
+    rest = rest_positions(folder, frames[-1])
     for frame in frames:
         vertices, faces = read_ply(folder / f"{frame:03d}_mesh.ply")
-        rest = rest_positions(len(vertices), size)
         clear = [face for face in faces if all(max(rest[i]) > grasp for i in face)]
         found[frame] = piercings(vertices, clear)
     return found
 
 
-def rest_positions(count, size):
-    """Of a square sheet whose vertices are numbered row by row."""
-    side = math.isqrt(count)
-    return [(size * (i % side) / (side - 1), size * (i // side) / (side - 1), 0.0) for i in range(count)]
+def rest_positions(folder, frame):
+    """Of a square sheet that lies flat in frame 0, along its sides from the corner that is highest in `frame`, the grasped one."""
+    start = [vertex[:2] for vertex in read_ply(folder / "000_mesh.ply")[0]]
+    lifted = [vertex[2] for vertex in read_ply(folder / f"{frame:03d}_mesh.ply")[0]]
+    middle = [sum(x) / len(start) for x in zip(*start)]
+    first = max(range(len(start)), key=lambda i: math.dist(start[i], middle))
+    across = max(range(len(start)), key=lambda i: math.dist(start[i], start[first]))
+
+    def beside(i):
+        (x, y), (u, v) = ([a - b for a, b in zip(start[k], start[first])] for k in (i, across))
+        return u * y - v * x
+
+    sides = max(range(len(start)), key=beside), min(range(len(start)), key=beside)
+    corner = max((first, across, *sides), key=lambda i: lifted[i])
+    neighbours = sides if corner in (first, across) else (first, across)
+    axes = [[(a - b) / math.dist(start[n], start[corner]) for a, b in zip(start[n], start[corner])] for n in neighbours]
+    return [(*(sum(u * (a - b) for u, a, b in zip(axis, place, start[corner])) for axis in axes), 0.0) for place in start]
 
 
 def nearest_on_triangle(p, a, b, c):
@@ -113,13 +126,13 @@ def distance(a, b):
 
 def residual_by_zone(folder, frames, size=0.278, every=12, trim=0.05):
     """Trimmed mean distance [m] of observed points to the surface in three zones of the sheet, by the material
-    distance of the nearest point from the grasped corner (0, 0): within a third of the diagonal, the next,
+    distance of the nearest point from the grasped corner: within a third of the diagonal, the next,
     the rest. One point of `every` is measured."""
     zones = [[], [], []]
+    rest = rest_positions(folder, frames[-1])
     for frame in frames:
         vertices, faces = read_ply(folder / f"{frame:03d}_mesh.ply")
         cloud, _ = read_ply(folder / f"{frame:03d}_cloud.ply")
-        rest = rest_positions(len(vertices), size)
         measured = []
         for point in cloud[::every]:
             near = sorted(range(len(vertices)), key=lambda i: distance(point, vertices[i]))[:8]
