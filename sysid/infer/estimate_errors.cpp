@@ -6,6 +6,7 @@
 
 #include "data/text.h"
 #include "sysid/infer/held.h"
+#include "sysid/infer/solution_errors.h"
 #include "sysid/infer/verdict.h"
 #include "sysid/infer/weight_scale.h"
 
@@ -79,7 +80,7 @@ constexpr const char* half_step_name = "half_step";
 }  // namespace
 
 void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior& posterior,
-                    const std::vector<FinerSettings>& finer, bool with_held, bool with_cells) {
+                    const std::vector<FinerSettings>& finer, bool with_held, bool with_solution) {
   const std::vector<double> values = posterior.values();
   const ReplayCandidate candidate = candidate_at(values, task.grid);
   std::vector<WantedMotion> wanted = wanted_at(task, emulator, candidate);
@@ -89,7 +90,10 @@ void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior&
     if (each.what == half_step_name) of_draws = &each.replays;
   }
   if (with_held) add_wanted(task, held_of(task, values), values, wanted);
-  if (with_cells && task.cells != nullptr)
+  std::vector<Replay> quarter_steps;
+  if (with_solution && task.settings.solver_check) quarter_steps = with_step(task.replays, 0.25);
+  for (const Replay& replay : quarter_steps) wanted.push_back({&replay, candidate});
+  if (with_solution && task.cells != nullptr)
     for (const std::vector<Replay>* replays : {&task.cells->of_sheet, &task.cells->between})
       for (const Replay& replay : *replays) wanted.push_back({&replay, candidate});
   for (const std::vector<double>& draw : draws_of(posterior))

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "data/parallel.h"
-#include "sysid/infer/mesh_errors.h"
+#include "sysid/infer/solution_errors.h"
 #include "sysid/observe/motion_distance.h"
 
 namespace flash::sysid {
@@ -59,16 +59,19 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   const Look first = look(extent, at);
   std::vector<FinerSettings> finer;
   if (task.settings.solver_check) finer = finer_settings(task.replays);
-  const bool knows_cells = std::any_of(held.begin(), held.end(), is_of_cells),
-             knows_held = !std::all_of(held.begin(), held.end(), is_of_cells);
-  simulate_ahead(task, emulator, first.posterior, finer, !knows_held, !knows_cells);
+  const bool knows_solution = std::any_of(held.begin(), held.end(), is_found_once),
+             knows_held = !std::all_of(held.begin(), held.end(), is_found_once);
+  simulate_ahead(task, emulator, first.posterior, finer, !knows_held, !knows_solution);
   std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values(), std::move(finer));
   if (!estimate) return std::nullopt;
   const auto add_to_held = [&](std::vector<KnownError> more) {
     std::move(more.begin(), more.end(), std::back_inserter(held));
   };
   if (!knows_held) add_to_held(errors_of_held(task, first.posterior.values(), estimate->motions));
-  if (!knows_cells) add_to_held(errors_of_cells(task, emulator, first.posterior.values(), estimate->motions));
+  if (!knows_solution) {
+    add_to_held(errors_of_step(task, first.posterior.values()));
+    add_to_held(errors_of_cells(task, emulator, first.posterior.values(), estimate->motions));
+  }
   errors = estimate->errors;
   errors.insert(errors.end(), held.begin(), held.end());
   for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
@@ -245,7 +248,7 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   for (const KnownError& error : found.estimate.errors)
     checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
   for (const KnownError& error : found.errors)
-    if (error.name == half_sheet_cells)
+    if (error.name == half_sheet_cells || error.name == quarter_step)
       checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
   return checks;
 }

@@ -16,6 +16,18 @@ inline data::SheetMaterial short_lift_material() {
   return material;
 }
 
+/// Of 48 x 36 pixels.
+inline SynthCamera small_camera(const Eigen::Vector3d& from, const Eigen::Vector3d& at) {
+  SynthCamera camera;
+  camera.intrinsics.width = 48;
+  camera.intrinsics.height = 36;
+  camera.intrinsics.fx = camera.intrinsics.fy = 50;
+  camera.intrinsics.cx = 23.5;
+  camera.intrinsics.cy = 17.5;
+  camera.base_from_camera = look_at(from, at, Eigen::Vector3d::UnitZ());
+  return camera;
+}
+
 /// A strip lifted by its end within 0.4 s, recorded and loaded back from its files.
 inline Replay short_lift(const data::TemporaryFolder& folder,
                          const std::string& mesh = "sheet:0.2x0.05:0.025:alternating",
@@ -28,14 +40,7 @@ inline Replay short_lift(const data::TemporaryFolder& folder,
   settings.keyframe_rate = 50;
   settings.grasp_within = 0.051;
   settings.clamp_slopes = true;
-  SynthCamera camera;
-  camera.intrinsics.width = 48;
-  camera.intrinsics.height = 36;
-  camera.intrinsics.fx = camera.intrinsics.fy = 50;
-  camera.intrinsics.cx = 23.5;
-  camera.intrinsics.cy = 17.5;
-  camera.base_from_camera = look_at({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02}, Eigen::Vector3d::UnitZ());
-  settings.cameras = {camera};
+  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02})};
   SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, material, settings, {});
   save_synthetic(made, folder / "lift");
   ReplaySettings replay;

@@ -8,6 +8,7 @@ ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.4x0.4:0.01", "element_type"
 # recording: nominal D [N m], noise [m]
 TWINS = {"lift_a": (1e-4, 0.002), "lift_a_one_camera_3mm": (1e-4, 0.003), "lift_b": (1e-5, 0.002)}
 FACTORS = {"isometric": (0.7, 0.85, 1.0, 1.15, 1.3), "plate": (0.85, 1.0, 1.2, 1.45, 1.75)}  # of the nominal D
+AS_MADE = ("--grasp-cell", "0")  # the cells of the truth, at the grasp too
 PATTERNS = ("alternating", "alternating, other parity", "alternating by row")
 
 
@@ -56,14 +57,14 @@ def fit(runs, data, assets, meshes, twin, model, pattern):
     values = ",".join(f"{factor * nominal:.4g}" for factor in FACTORS[model])
     name = f"twin_{twin}/{model}_{pattern.replace(',', '').replace(' ', '_')}"
     return runs.grid(name, [data / "twin" / twin], "--asset", assets[model], "--mesh", meshes[pattern], "--bending",
-                     values, "--no-solver-check", "--hold", "friction=0.3:measured", "--hold", "areal_density=0.2:measured")
+                     values, *AS_MADE, "--no-solver-check", "--hold", "friction=0.3:measured", "--hold", "areal_density=0.2:measured")
 
 
 def fit_both(runs, data, assets, meshes, twin):
     """E and D at once on the truth's diagonals. The recordings of lift_a show the same motion, simulated once."""
     return runs.grid(f"twin_{twin}/both", [data / "twin" / twin], "--asset", assets["isometric"], "--mesh",
                      meshes["alternating, other parity"], "--young", "1e4:9e4:5:log", "--bending", "5e-5:2e-4:5:log",
-                     "--no-solver-check", "--hold", "friction=0.3:measured", "--hold", "areal_density=0.2:measured", "--rollouts",
+                     *AS_MADE, "--no-solver-check", "--hold", "friction=0.3:measured", "--hold", "areal_density=0.2:measured", "--rollouts",
                      str(runs.out / "twin_lift_a" / "rollouts"))
 
 
@@ -77,7 +78,7 @@ LONGER_FITS = (("plate", "alternating"), ("isometric", "alternating"), ("isometr
 def horizon(runs, assets, meshes, model, pattern):
     """When the lift of lift_b, made here and gone on with to 3 s, stops being predictable [s]; None: it does not."""
     name = f"twin_longer/{model}_{pattern.replace(',', '').replace(' ', '_')}"
-    mesh = ("--asset", assets[model], "--mesh", meshes[pattern])
+    mesh = ("--asset", assets[model], "--mesh", meshes[pattern], *AS_MADE)
     recording = runs.synth(f"{name}_recording", *mesh[1:], *LONGER, "--hold", "bending=1e-5:measured")
     summary = runs.grid(name, [recording], *mesh, "--bending", "8e-6,1e-5,1.25e-5", "--no-solver-check", "--hold",
                         "friction=0.3:measured", "--hold", "areal_density=0.2:measured", horizon=True)

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "data/meshing/remesh.h"
 #include "data/procedural_mesh.h"
 #include "sysid/observe/score.h"
+#include "tests/sysid/short_lift.h"
 #include "tests/sysid/tracked_beam.h"
 
 namespace flash::sysid {
@@ -54,6 +56,26 @@ TEST(HalfCell, SplitsTheTetrahedraOfAFile) {
   };
   EXPECT_LT(miss(finer), 0.4 * miss(replay));
   EXPECT_EQ(on_half_the_cell(finer).recording.tetrahedra.rows(), 64 * coarse.tetrahedra.rows());
+}
+
+TEST(HalfCell, TheSheetsCellsAreHalvedBesideTheSameCellsAtTheGrasp) {
+  const data::TemporaryFolder folder;
+  SynthSettings settings;
+  settings.duration = 0.1;
+  settings.grasp_within = 0.02;
+  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.1, 0})};
+  const std::string mesh = "sheet:0.2x0.2:0.04";
+  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, short_lift_material(), settings, {});
+  save_synthetic(made, folder / "lift");
+  const std::vector<Replay> replays = {make_replay(data::load_recording(folder / "lift"), {})};
+  const OtherCells cells = other_cells(replays);
+  ASSERT_EQ(cells.of_sheet.size(), 1u);
+  ASSERT_EQ(cells.between.size(), 1u);
+  const auto edges = [](const Replay& replay) { return data::edge_lengths(replay.recording.mesh); };
+  EXPECT_NEAR(edges(cells.of_sheet[0]).least, 0.5 * edges(replays[0]).least, 1e-12);
+  EXPECT_NEAR(edges(cells.of_sheet[0]).largest, 0.5 * edges(replays[0]).largest, 1e-12);
+  EXPECT_LT(edges(cells.between[0]).least, 0.75 * edges(replays[0]).least);
+  EXPECT_NEAR(edges(cells.between[0]).largest, edges(replays[0]).largest, 1e-12);
 }
 
 }  // namespace

@@ -17,7 +17,20 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here);
 
-bool is_of_cells(const KnownError& error);
+/// The error of the time step that half the step does not show: twice what a quarter of it changes then, so
+/// that motions are corrected by
+///
+///     (x_{h/2} - x_h) + 2 (x_{h/4} - x_{h/2}),
+///
+/// the way to no step at all where the error is of first order from h / 2 on. `values`: the estimate. Empty
+/// where a motion diverged.
+std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values);
+
+/// The recordings with a share of the time step, keyframes weighing as they do.
+std::vector<Replay> with_step(const std::vector<Replay>& replays, double share);
+
+/// Whether an error is one of these, which are found at the first estimate and kept.
+bool is_found_once(const KnownError& error);
 
 /// How differences between motions fall as cells are halved, and halved again: |x_4 - x_2| / |x_2 - x_1|,
 /// over the vertices that all three meshes have, the first ones. An error of first order falls to 1/2, of
@@ -31,5 +44,6 @@ inline constexpr double most_ratio = 0.75;
 
 inline constexpr const char* half_sheet_cells = "half_sheet_cells";
 inline constexpr const char* unsettled_cells = "unsettled_cells";
+inline constexpr const char* quarter_step = "quarter_step";
 
 }  // namespace flash::sysid

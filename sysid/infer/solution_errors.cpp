@@ -1,4 +1,4 @@
-#include "sysid/infer/mesh_errors.h"
+#include "sysid/infer/solution_errors.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,12 +38,36 @@ KnownError error_of(const char* name, std::shared_ptr<const Motions> from, Motio
           name};
 }
 
-constexpr double kSecondOrder = 4.0 / 3;  // the way to cells of no size over that to cells of half the size
+constexpr double kFirstOrder = 2,
+                 kSecondOrder = 4.0 / 3;  // the way to cells of no size over that to cells of half the size
 
 }  // namespace
 
-bool is_of_cells(const KnownError& error) {
-  return error.name == half_sheet_cells || error.name == unsettled_cells;
+bool is_found_once(const KnownError& error) {
+  return error.name == half_sheet_cells || error.name == unsettled_cells || error.name == quarter_step;
+}
+
+std::vector<Replay> with_step(const std::vector<Replay>& replays, double share) {
+  std::vector<Replay> result;
+  for (const Replay& replay : replays) {
+    ReplaySettings settings = replay.settings;
+    settings.solver.time_step *= share;
+    result.push_back(make_replay(replay, settings, replay.plan));
+  }
+  return result;
+}
+
+std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values) {
+  if (!task.settings.solver_check) return {};
+  const auto at = [&](double share) {
+    std::vector<Replay> replays = with_step(task.replays, share);
+    std::vector<ReplayResult> motions = motions_on(task, replays, values);
+    return Motions{std::move(replays), std::move(motions)};
+  };
+  Motions half = at(0.5), quarter = at(0.25);
+  if (half.results.empty() || quarter.results.empty()) return {};
+  return {error_of(quarter_step, std::make_shared<const Motions>(std::move(half)), std::move(quarter), true,
+                   kFirstOrder)};
 }
 
 double observed_ratio(const std::vector<ReplayResult>& cells, const std::vector<ReplayResult>& halves,
