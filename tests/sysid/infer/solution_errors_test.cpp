@@ -23,7 +23,7 @@ TEST(SolutionErrors, TheObservedRatioIsThatOfBothHalvings) {
 TEST(SolutionErrors, TwoHalvingsOfTheStepLeadToNoStep) {
   const data::TemporaryFolder folder;
   // Steps that follow how the strip swings, which those of 10 ms do not.
-  const std::vector<Replay> replays = with_step({short_lift(folder)}, 0.125), none;
+  const std::vector<Replay> replays = with_step({short_lift(folder)}, 1.0 / 64), none;
   GridSettings grid;
   grid.base.material = short_lift_material();
   grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
