@@ -41,7 +41,7 @@ std::string solver_check_label(const std::string& what) {
       {"double_mesh", "cells of no size"},
       {"half_sheet_cells", "cells of the sheet halved"},
       {"half_step", "half the time step"},
-      {"quarter_step", "a quarter of it"},
+      {"quarter_step", "a quarter of the time step"},
       {"four_times_iterations", "four times the iterations"}};
   const auto found = labels.find(what);
   return found == labels.end() ? what : found->second;
