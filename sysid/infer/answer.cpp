@@ -6,6 +6,7 @@
 #include "data/text.h"
 #include "sysid/emulate/focused_axes.h"
 #include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/coarse_cells.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/lattice_about.h"
@@ -363,6 +364,12 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back(
         "the motion does not settle as the cells at the grasp shrink: the intervals take what smaller ones "
         "change as a whole; search on a finer mesh, or with a smaller --grasp-cell");
+
+  if (std::any_of(ranges.begin(), ranges.end(),
+                  [](const Axis& axis) { return axis.name == "friction" && axis.values.size() > 1; }))
+    if (const std::string text = coarse_cells_text(replays, candidate_at(answer.values, usable));
+        !text.empty())
+      answer.warnings.push_back(text);
 
   Posterior posterior = there.look.posterior;
   if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);
