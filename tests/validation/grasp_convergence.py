@@ -22,6 +22,7 @@ BASE = {"grasp": "clamp", "young": 100.0, "bending": 1e-4, "side": SIDE}
 OTHERS = {"grasp": ("pinch", "point"), "young": (10.0, 1000.0), "bending": (1e-5, 1e-3), "side": (0.2, 0.5, 1.0)}
 CASES = [BASE] + [BASE | {name: value} for name, values in OTHERS.items() for value in values]
 HALVINGS = {"grasp": 3, "sheet": 2}
+PLACES = {"grasp": "at the grasp", "sheet": "of the sheet"}
 
 TRUTH = {"bending": 2e-4, "friction": 0.3}
 SEARCH_CELLS = (0.04, 0.028, 0.02, 0.014, 0.01, 0.007)
@@ -197,7 +198,7 @@ def main():
     runs = kept.Runs(options.sysid, options.out, options.threads)
     parts = {
         "motions": ("grasp_motions", convergence_row, [(case,) for case in CASES],
-                    ["grasp", "E t N/m", "D N m", "side m", *(f"{what} {k}: mm | D" for what, count in HALVINGS.items()
+                    ["grasp", "E t N/m", "D N m", "side m", *(f"{PLACES[what]}, {k}: mm | D" for what, count in HALVINGS.items()
                                                               for k in range(1, count + 1))]),
         "searches": ("grasp_searches", search_row, SEARCHES, ["grasp", "E t N/m", "cells mm", "D over the truth", "friction, likewise", "says", "s"]),
         "sizes": ("grasp_sizes", stated_row, [(size,) for size in STATED], ["stated mm", "D over the truth", "friction, likewise", "says"])}
