@@ -83,6 +83,9 @@ std::vector<Axis> first_on_finer_mesh(std::vector<Axis> axes, const std::vector<
 /// height, and what was stated with a deviation.
 std::size_t most_held(const GridSettings& grid) { return 7 + grid.deviations.size(); }
 
+/// What solution_errors asks for: two motions of the step and three of the cells.
+constexpr std::size_t most_found_once = 5;
+
 /// To both sides, and on other cells.
 std::size_t most_held_motions(const GridSettings& grid) { return 2 * most_held(grid) + 2; }
 
@@ -285,7 +288,8 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
-  std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) + most_horizon_motions(grid) +
+  std::size_t motions = motions_at_estimate + most_found_once + most_held_motions(grid) +
+                        most_horizon_motions(grid) +
                         most_motions_alone(recordings, 2 * many_motions(grid.axes)) +
                         lattice_rounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += own > 0 ? 1 : cartesian_product(thinned(most_focused(grid.axes))).size();

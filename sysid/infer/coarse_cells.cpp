@@ -1,7 +1,6 @@
 #include "sysid/infer/coarse_cells.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -23,21 +22,21 @@ double typical_cell(const data::TriangleMesh& mesh) {
 
 std::string coarse_cells_text(const std::vector<Replay>& replays, const ReplayCandidate& candidate) {
   constexpr double kMost = 0.4;  // of the radius
-  if (candidate.solid) return "";
-  double cell = 0, gravity = 0;
-  for (const Replay& replay : replays) {
-    if (!replay.recording.has_table) continue;
-    cell = std::max(cell, typical_cell(replay.recording.mesh));
-    gravity = replay.recording.gravity.norm();
-  }
   const data::SheetMaterial& material = candidate.material;
-  const double radius = std::cbrt(material.bending_rigidity / (material.areal_density * gravity));
-  if (!(cell > kMost * radius)) return "";
-  const auto mm = [](double length) { return data::format_short(std::round(1e3 * length)) + " mm"; };
-  return "cells of " + mm(cell) + " are coarse for a sheet that leaves the table in a fold of about " +
-         mm(radius) +
-         ": friction may be off by a few percent more than its interval says. Search on cells of " +
-         data::format_short(std::floor(1e3 * kMost * radius)) + " mm";
+  const auto mm = [](double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; };
+  for (const Replay& replay : replays) {
+    const double weight = material.areal_density * replay.recording.gravity.norm();
+    if (candidate.solid || !replay.recording.has_table || !(weight > 0 && material.bending_rigidity > 0))
+      continue;
+    const double cell = typical_cell(replay.recording.mesh),
+                 radius = std::cbrt(material.bending_rigidity / weight);
+    if (cell > kMost * radius)
+      return "cells of " + mm(cell) + " are coarse for a sheet that leaves the table in a fold of about " +
+             mm(radius) +
+             ": friction may be off by a few percent more than its interval says. Search on cells of " +
+             mm(kMost * radius);
+  }
+  return "";
 }
 
 }  // namespace flash::sysid

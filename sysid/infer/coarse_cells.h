@@ -15,7 +15,8 @@ double typical_cell(const data::TriangleMesh& mesh);
 ///
 /// rho the areal density: its bending length (Peirce 1930). Where cells take more than 0.4 of that, the line
 /// along which the sheet leaves the table moves from vertex to vertex, an error of first order that friction
-/// answers for. What a warning then says; empty where cells are smaller, there is no table or a solid.
+/// answers for. What a warning then says; of the first such recording; empty where there is none:
+/// cells are smaller, or there is no table, no weight, no bending or a solid.
 std::string coarse_cells_text(const std::vector<Replay>& replays, const ReplayCandidate& candidate);
 
 }  // namespace flash::sysid

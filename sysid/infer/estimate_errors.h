@@ -17,8 +17,8 @@ inline constexpr double own_mesh = 0, finer_mesh = 1, no_cells = 4.0 / 3;
 /// Draws at which an emulator is tried.
 inline constexpr int emulator_draws = 4;
 
-/// Motions simulated at an estimate, a recording: itself, four finer ones, and the draws.
-inline constexpr int motions_at_estimate = 5 + emulator_draws;
+/// Motions simulated at an estimate, a recording: itself, three finer ones, and the draws.
+inline constexpr int motions_at_estimate = 4 + emulator_draws;
 
 /// What all steps of an answer need.
 struct Task {
@@ -45,7 +45,7 @@ struct Estimate {
 std::vector<Replay> replays_of(const Emulator& emulator);
 
 /// Simulates side by side what solve_at, errors_at_draws and, `with_held` and `with_solution`, errors_of_held
-/// and errors_of_cells ask for about a posterior.
+/// and those of solution_errors ask for about a posterior.
 void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior& posterior,
                     const std::vector<FinerSettings>& finer, bool with_held, bool with_solution);
 

@@ -38,23 +38,13 @@ KnownError error_of(const char* name, std::shared_ptr<const Motions> from, Motio
           name};
 }
 
-constexpr double kFirstOrder = 2,
-                 kSecondOrder = 4.0 / 3;  // the way to cells of no size over that to cells of half the size
+// The way to no step, or cells of no size, over that to half of it.
+constexpr double kFirstOrder = 2, kSecondOrder = 4.0 / 3;
 
 }  // namespace
 
 bool is_found_once(const KnownError& error) {
   return error.name == half_sheet_cells || error.name == unsettled_cells || error.name == quarter_step;
-}
-
-std::vector<Replay> with_step(const std::vector<Replay>& replays, double share) {
-  std::vector<Replay> result;
-  for (const Replay& replay : replays) {
-    ReplaySettings settings = replay.settings;
-    settings.solver.time_step *= share;
-    result.push_back(make_replay(replay, settings, replay.plan));
-  }
-  return result;
 }
 
 std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values) {

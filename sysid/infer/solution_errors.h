@@ -10,9 +10,10 @@ namespace flash::sysid {
 /// smaller cells there alone. `here`: the estimate on the search's own mesh, one motion a recording. Empty
 /// where the task has no other cells; what diverged is left out.
 ///
-/// "half_sheet_cells": by what half of the cells of the sheet moves it, those at the grasps apart; motions
-/// are corrected by that. "unsettled_cells": the way to the finer mesh as a whole, where differences do not
-/// fall as the extrapolation to cells of no size assumes (observed_ratio above most_ratio).
+/// "half_sheet_cells": by what half of the cells of the sheet moves it, those at the grasps apart, and a
+/// third more, as for an error of second order; motions are corrected by that. "unsettled_cells": the way to
+/// the finer mesh as a whole, where differences do not fall as the extrapolation to cells of no size assumes
+/// (observed_ratio above most_ratio).
 std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulator,
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here);
@@ -25,9 +26,6 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
 /// the way to no step at all where the error is of first order from h / 2 on. `values`: the estimate. Empty
 /// where a motion diverged.
 std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values);
-
-/// The recordings with a share of the time step, keyframes weighing as they do.
-std::vector<Replay> with_step(const std::vector<Replay>& replays, double share);
 
 /// Whether an error is one of these, which are found at the first estimate and kept.
 bool is_found_once(const KnownError& error);

@@ -18,13 +18,6 @@ Replay changed(const Replay& replay, const Change& change) {
   return make_replay(replay, settings, replay.plan);
 }
 
-const std::vector<std::pair<std::string, Change>> kFinerSteps = {
-    {"half_step", [](ReplaySettings& settings) { settings.solver.time_step *= 0.5; }},
-    {"four_times_iterations", [](ReplaySettings& settings) {
-       settings.solver.max_iterations *= 4;
-       settings.solver.tolerance *= 0.1;
-     }}};
-
 std::vector<Replay> changed(const std::vector<Replay>& replays, const Change& change) {
   std::vector<Replay> result;
   for (const Replay& replay : replays) result.push_back(changed(replay, change));
@@ -85,10 +78,16 @@ SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensit
   return found;
 }
 
+std::vector<Replay> with_step(const std::vector<Replay>& replays, double share) {
+  return changed(replays, [&](ReplaySettings& settings) { settings.solver.time_step *= share; });
+}
+
 std::vector<FinerSettings> finer_settings(const std::vector<Replay>& replays) {
-  std::vector<FinerSettings> settings;
-  for (const auto& [what, change] : kFinerSteps) settings.push_back({what, changed(replays, change)});
-  return settings;
+  return {{"half_step", with_step(replays, 0.5)},
+          {"four_times_iterations", changed(replays, [](ReplaySettings& settings) {
+             settings.solver.max_iterations *= 4;
+             settings.solver.tolerance *= 0.1;
+           })}};
 }
 
 std::vector<FinerSolution> finer_solutions(std::vector<FinerSettings> settings,

@@ -22,6 +22,9 @@ struct FinerSettings {
   std::vector<Replay> replays;
 };
 
+/// The recordings with a share of the time step, keyframes weighing as they do.
+std::vector<Replay> with_step(const std::vector<Replay>& replays, double share);
+
 /// Half the step, and four times the iterations at a tenth of the tolerance.
 std::vector<FinerSettings> finer_settings(const std::vector<Replay>& replays);
 

@@ -87,8 +87,7 @@ def motion(runs, recording, case, cell, grasp_cell, bending):
     name = "_".join(str(x) for x in ("motion", case["grasp"], case["young"], case["side"], bending, cell, grasp_cell))
     settings = {"bending": bending, "friction": 0.3, "areal_density": 0.2}
     runs.replay(name, recording, settings, "--asset", asset_of(runs, case), "--mesh", mesh_of(case, cell), "--grasp-cell", repr(grasp_cell),
-                "--grasp-within", repr(PATCH), *[w for w in grasp_options(case) if "=" not in w and w != "--hold"],
-                *(["--hold", f"grasp_depth={PATCH}"] if case["grasp"] == "pinch" else []), "--tolerance", "1e-5",
+                "--grasp-within", repr(PATCH), *grasp_options(case), "--tolerance", "1e-5",
                 frames=",".join(map(str, (0, *FRAMES))))
     return runs.out / name
 

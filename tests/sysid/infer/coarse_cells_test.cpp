@@ -25,8 +25,9 @@ TEST(CoarseCells, AreToldWhereTheFoldIsNotFarLarger) {
     return coarse_cells_text(replays, candidate);
   };
   EXPECT_EQ(with_radius(1.01 * cell / 0.4), "");
-  EXPECT_NE(with_radius(0.99 * cell / 0.4).find("cells of 27 mm are coarse"), std::string::npos)
+  EXPECT_NE(with_radius(0.99 * cell / 0.4).find("cells of 26.9 mm are coarse"), std::string::npos)
       << with_radius(0.99 * cell / 0.4);
+  EXPECT_EQ(with_radius(0), "");
 }
 
 }  // namespace

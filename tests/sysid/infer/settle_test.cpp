@@ -13,7 +13,7 @@
 #include "sysid/capture/synth.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/infer/answer.h"
-#include "tests/data/temporary_folder.h"
+#include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {
 namespace {
@@ -85,14 +85,7 @@ Replay balanced_strip(const data::TemporaryFolder& folder, const data::SheetMate
   settings.rest = 0.8;
   settings.grasp_within = 0.051;
   settings.clamp_slopes = true;
-  SynthCamera camera;
-  camera.intrinsics.width = 48;
-  camera.intrinsics.height = 36;
-  camera.intrinsics.fx = camera.intrinsics.fy = 50;
-  camera.intrinsics.cx = 23.5;
-  camera.intrinsics.cy = 17.5;
-  camera.base_from_camera = look_at({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02}, Eigen::Vector3d::UnitZ());
-  settings.cameras = {camera};
+  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02})};
   SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, truth, settings, {});
   save_synthetic(made, folder / "strip");
   data::Recording recording = data::load_recording(folder / "strip");

@@ -149,14 +149,7 @@ SynthSettings slow_lift(double duration) {
   settings.duration = duration;
   settings.keyframe_rate = 5;
   settings.grasp_within = 0.02;
-  SynthCamera camera;
-  camera.intrinsics.width = 48;
-  camera.intrinsics.height = 36;
-  camera.intrinsics.fx = camera.intrinsics.fy = 50;
-  camera.intrinsics.cx = 23.5;
-  camera.intrinsics.cy = 17.5;
-  camera.base_from_camera = look_at({0.1, -0.3, 0.3}, {0.1, 0.1, 0.02}, Eigen::Vector3d::UnitZ());
-  settings.cameras = {camera};
+  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.1, 0.02})};
   return settings;
 }
 
