@@ -86,8 +86,8 @@ std::size_t most_held(const GridSettings& grid) { return 7 + grid.deviations.siz
 /// What solution_errors asks for: two motions of the step and three of the cells.
 constexpr std::size_t most_found_once = 5;
 
-/// To both sides, and on other cells.
-std::size_t most_held_motions(const GridSettings& grid) { return 2 * most_held(grid) + 2; }
+/// To both sides.
+std::size_t most_held_motions(const GridSettings& grid) { return 2 * most_held(grid); }
 
 /// The best candidate, and one nearby for each parameter.
 std::size_t most_horizon_motions(const GridSettings& grid) { return 1 + grid.axes.size() + most_held(grid); }
@@ -181,9 +181,8 @@ std::optional<Concluded> conclude_on_own_mesh(const Task& task, const Found& abo
     task.told({}, {-more.motions * static_cast<int>(task.replays.size()), -more.scores});
   }
   std::vector<KnownError> of_solution = errors_about(about, {}), errors = held;
+  for (KnownError& error : of_solution) error.corrects = false;
   errors.insert(errors.end(), of_solution.begin(), of_solution.end());
-  for (std::vector<KnownError>* all : {&of_solution, &errors})
-    for (KnownError& error : *all) error.corrects = false;
   std::optional<Found> found =
       look_with(own, std::move(*emulator), axes, cells_about(best, axes), best, errors, errors);
   if (!found) return std::nullopt;
@@ -202,13 +201,16 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
   Found about = simulate_about(task, found, held);
   const std::string unrefined = about.unrefined;
   const Settled settled = settle(task, about, best, held);
-  if (settled == Settled::on_own_mesh)
-    if (std::optional<Concluded> own = conclude_on_own_mesh(task, about, best, held, alone))
-      return std::move(*own);
-  if (settled == Settled::by_emulator || settled == Settled::by_points)
+  if (settled == Settled::by_emulator || settled == Settled::by_points) {
     found = std::move(about);
-  else
+  } else {
+    // Of the search's own mesh and step: what they lack is by how much the answer may be wrong.
+    for (KnownError& error : held) error.corrects = false;
+    if (settled == Settled::on_own_mesh)
+      if (std::optional<Concluded> own = conclude_on_own_mesh(task, about, best, held, alone))
+        return std::move(*own);
     keep_to_simulated(task, found, best, held);
+  }
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
   if (!unrefined.empty()) answer.warnings.push_back(unrefined);
@@ -258,8 +260,8 @@ void keep_predictable(const std::vector<double>& best, const GridSettings& grid,
 }  // namespace
 
 AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
-  const std::size_t motions =
-      lattice_rounds * (2 * few_motions(grid.axes) + motions_at_estimate) + most_held_motions(grid);
+  const std::size_t motions = lattice_rounds * (2 * few_motions(grid.axes) + motions_at_estimate) +
+                              most_found_once + most_held_motions(grid);
   return {static_cast<int>(recordings * motions), 2 * lattice_rounds * most_scores(grid.axes)};
 }
 
@@ -369,12 +371,6 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         "the motion does not settle as the cells at the grasp shrink: the intervals take what smaller ones "
         "change as a whole; search on a finer mesh, or with a smaller --grasp-cell");
 
-  if (std::any_of(ranges.begin(), ranges.end(),
-                  [](const Axis& axis) { return axis.name == "friction" && axis.values.size() > 1; }))
-    if (const std::string text = coarse_cells_text(replays, candidate_at(answer.values, usable));
-        !text.empty())
-      answer.warnings.push_back(text);
-
   Posterior posterior = there.look.posterior;
   if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);
   if (const double spread = spread_of_scale(usable, replays); spread > 0)
@@ -388,6 +384,12 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.open_information =
       open_information(at_fit, spreads_over(ranges, extent_of(there.look.posterior.axes)));
   answer.parameters = findings_of(results, ranges, posterior, grid.base);
+  if (std::any_of(answer.parameters.begin(), answer.parameters.end(), [](const ParameterFinding& finding) {
+        return finding.name == "friction" && finding.identifiable != Identifiable::no;
+      }))
+    if (const std::string text = coarse_cells_text(replays, candidate_at(answer.values, usable));
+        !text.empty())
+      answer.warnings.push_back(text);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, there);

@@ -21,7 +21,8 @@ double typical_cell(const data::TriangleMesh& mesh) {
 }
 
 std::string coarse_cells_text(const std::vector<Replay>& replays, const ReplayCandidate& candidate) {
-  constexpr double kMost = 0.4;  // of the radius
+  constexpr double kMost = 0.4;        // of the radius
+  constexpr double kOfPattern = 1.08;  // typical cell over that of a specification, of right triangles
   const data::SheetMaterial& material = candidate.material;
   const auto mm = [](double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; };
   for (const Replay& replay : replays) {
@@ -34,7 +35,7 @@ std::string coarse_cells_text(const std::vector<Replay>& replays, const ReplayCa
       return "cells of " + mm(cell) + " are coarse for a sheet that leaves the table in a fold of about " +
              mm(radius) +
              ": friction may be off by a few percent more than its interval says. Search on cells of " +
-             mm(kMost * radius);
+             mm(kMost * radius / kOfPattern);
   }
   return "";
 }

@@ -52,15 +52,22 @@ Vector3d place_at_rest(const data::Recording& recording, const Vector3d& place) 
   return recording.mesh.vertices.row(nearest).transpose();
 }
 
-/// The edge of a box, with those of its corners that lie inside the sheet.
+/// The edge of a box, with those of its corners that lie in the sheet. One across the whole sheet has none.
 data::Outline box_outline(const data::Points& rest, const Eigen::AlignedBox3d& box) {
   data::Outline outline{[box](const Vector3d& x) { return box_distance(box, x); }};
   const Vector3d low = rest.colwise().minCoeff().transpose(), high = rest.colwise().maxCoeff().transpose();
-  const double slack = 1e-9 * (high - low).maxCoeff();
+  const Vector3d slack = Vector3d::Constant(1e-9 * (high - low).maxCoeff());
+  for (int axis = 0; axis < 2; ++axis)
+    if (box.min()[axis] <= low[axis] + slack[axis] && box.max()[axis] >= high[axis] - slack[axis])
+      return outline;
+  const Eigen::AlignedBox3d sheet(low - slack, high + slack);
   for (const double x : {box.min().x(), box.max().x()})
-    for (const double y : {box.min().y(), box.max().y()})
-      if (x > low.x() + slack && x < high.x() - slack && y > low.y() + slack && y < high.y() - slack)
-        outline.corners.emplace_back(x, y, low.z());
+    for (const double y : {box.min().y(), box.max().y()}) {
+      const Vector3d corner(x, y, low.z());
+      const bool is_new =
+          std::find(outline.corners.begin(), outline.corners.end(), corner) == outline.corners.end();
+      if (sheet.contains(corner) && is_new) outline.corners.push_back(corner);
+    }
   return outline;
 }
 

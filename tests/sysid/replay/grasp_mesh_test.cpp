@@ -60,6 +60,27 @@ TEST(GraspMesh, HoldsThePatchItselfWhateverTheCells) {
   }
 }
 
+TEST(GraspMesh, ABoxAcrossTheSheetHasNoCornersAndAPartOfItsEdgeHas) {
+  data::Recording recording = towel("sheet:0.2x0.2:0.02:alternating");
+  data::Selection& select = recording.grasps[0].select;
+  const auto hold = [&](double from, double to) {  // the vertices of the edge x = 0.2 between
+    select = {};
+    for (Eigen::Index i = 0; i < recording.mesh.vertices.rows(); ++i)
+      if (const auto v = recording.mesh.vertices.row(i); v.x() > 0.199 && v.y() > from && v.y() < to)
+        select.vertices.push_back(static_cast<int>(i));
+  };
+  const double cell = data::edge_lengths(recording.mesh).mean;
+  hold(-1, 1);
+  const data::Outline whole = grasp_outlines(recording, {})[0];
+  EXPECT_TRUE(whole.corners.empty());
+  EXPECT_NEAR(whole.near, cell / 2, 1e-12);
+  hold(0.07, 0.13);
+  const data::Outline part = grasp_outlines(recording, {})[0];
+  ASSERT_EQ(part.corners.size(), 2u);
+  EXPECT_NEAR((part.corners[1] - part.corners[0]).norm(), 0.04, 1e-12);
+  EXPECT_NEAR(part.near, cell / 5, 1e-12);
+}
+
 TEST(GraspMesh, APatternIsKeptWhereItIsNamedAndNoCellIsAskedFor) {
   const std::string named = std::string(kTowel) + ":alternating";
   data::Recording recording = towel(named);
