@@ -28,6 +28,8 @@ struct RecordedGrasp {
   Eigen::Vector3d direction =
       Eigen::Vector3d::Zero();  ///< pinch: along the ridge, base frame; zero: the sheet's diagonal
   double pitch = 0.0;           ///< pinch: tilt of the ridge [rad]
+  /// Of a mesh that was made smaller along what is held: of that; 0: no smaller than elsewhere [m].
+  double cell = 0.0;
 };
 
 /// Vertices that are held where they start.

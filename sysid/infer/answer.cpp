@@ -83,9 +83,6 @@ std::vector<Axis> first_on_finer_mesh(std::vector<Axis> axes, const std::vector<
 /// height, and what was stated with a deviation.
 std::size_t most_held(const GridSettings& grid) { return 7 + grid.deviations.size(); }
 
-/// What solution_errors asks for: two motions of the step and three of the cells.
-constexpr std::size_t most_found_once = 5;
-
 /// To both sides.
 std::size_t most_held_motions(const GridSettings& grid) { return 2 * most_held(grid); }
 
@@ -261,7 +258,7 @@ void keep_predictable(const std::vector<double>& best, const GridSettings& grid,
 
 AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
   const std::size_t motions = lattice_rounds * (2 * few_motions(grid.axes) + motions_at_estimate) +
-                              most_found_once + most_held_motions(grid);
+                              motions_of_solution + most_held_motions(grid);
   return {static_cast<int>(recordings * motions), 2 * lattice_rounds * most_scores(grid.axes)};
 }
 
@@ -290,7 +287,7 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
-  std::size_t motions = motions_at_estimate + most_found_once + most_held_motions(grid) +
+  std::size_t motions = motions_at_estimate + motions_of_solution + most_held_motions(grid) +
                         most_horizon_motions(grid) +
                         most_motions_alone(recordings, 2 * many_motions(grid.axes)) +
                         lattice_rounds * (own + motions_at_estimate + (solver_check ? finer : 0));
@@ -387,9 +384,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   if (std::any_of(answer.parameters.begin(), answer.parameters.end(), [](const ParameterFinding& finding) {
         return finding.name == "friction" && finding.identifiable != Identifiable::no;
       }))
-    if (const std::string text = coarse_cells_text(replays, candidate_at(answer.values, usable));
-        !text.empty())
-      answer.warnings.push_back(text);
+    if (const auto coarse = coarse_cells(replays, candidate_at(answer.values, usable)))
+      answer.warnings.push_back(coarse_cells_text(*coarse));
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, there);

@@ -20,24 +20,34 @@ double typical_cell(const data::TriangleMesh& mesh) {
   return std::sqrt(4 / std::numbers::sqrt3 * squares / areas);
 }
 
-std::string coarse_cells_text(const std::vector<Replay>& replays, const ReplayCandidate& candidate) {
-  constexpr double kMost = 0.4;        // of the radius
-  constexpr double kOfPattern = 1.08;  // typical cell over that of a specification, of right triangles
+namespace {
+
+constexpr double kMost = 0.5;  // of the radius
+
+}  // namespace
+
+std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays,
+                                        const ReplayCandidate& candidate) {
   const data::SheetMaterial& material = candidate.material;
-  const auto mm = [](double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; };
   for (const Replay& replay : replays) {
     const double weight = material.areal_density * replay.recording.gravity.norm();
     if (candidate.solid || !replay.recording.has_table || !(weight > 0 && material.bending_rigidity > 0))
       continue;
-    const double cell = typical_cell(replay.recording.mesh),
-                 radius = std::cbrt(material.bending_rigidity / weight);
-    if (cell > kMost * radius)
-      return "cells of " + mm(cell) + " are coarse for a sheet that leaves the table in a fold of about " +
-             mm(radius) +
-             ": friction may be off by a few percent more than its interval says. Search on cells of " +
-             mm(kMost * radius / kOfPattern);
+    const CoarseCells cells = {typical_cell(replay.recording.mesh),
+                               std::cbrt(material.bending_rigidity / weight)};
+    if (cells.cell > kMost * cells.radius) return cells;
   }
-  return "";
+  return std::nullopt;
+}
+
+std::string coarse_cells_text(const CoarseCells& coarse) {
+  constexpr double kOfPattern = 1.08;  // typical cell over that of a specification, of right triangles
+  const auto mm = [](double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; };
+  return "cells of " + mm(coarse.cell) + " are coarse for a sheet that leaves the table in a fold of about " +
+         mm(coarse.radius) +
+         ": friction and bending may be off by a few percent more than their intervals say. Search on cells "
+         "of " +
+         mm(kMost * coarse.radius / kOfPattern);
 }
 
 }  // namespace flash::sysid

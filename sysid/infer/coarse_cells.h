@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,10 +14,17 @@ double typical_cell(const data::TriangleMesh& mesh);
 ///
 ///     (D / (rho g))^(1/3),
 ///
-/// rho the areal density: its bending length (Peirce 1930). Where cells take more than 0.4 of that, the line
-/// along which the sheet leaves the table moves from vertex to vertex, an error of first order that friction
-/// answers for. What a warning then says; of the first such recording; empty where there is none:
-/// cells are smaller, or there is no table, no weight, no bending or a solid.
-std::string coarse_cells_text(const std::vector<Replay>& replays, const ReplayCandidate& candidate);
+/// rho the areal density: its bending length (Peirce 1930). Where cells take more than half of that, their
+/// error does not fall by the second order from the first halving on.
+struct CoarseCells {
+  double cell = 0, radius = 0;  ///< [m]
+};
+
+/// Of the first recording in which they are; empty where there is none: cells are smaller, or there is no
+/// table, no weight, no bending or a solid.
+std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays, const ReplayCandidate& candidate);
+
+/// What a warning says of them.
+std::string coarse_cells_text(const CoarseCells& coarse);
 
 }  // namespace flash::sysid

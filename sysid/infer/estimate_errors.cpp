@@ -90,12 +90,10 @@ void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior&
     if (each.what == half_step_name) of_draws = &each.replays;
   }
   if (with_held) add_wanted(task, held_of(task, values), values, wanted);
-  std::vector<Replay> quarter_steps;
-  if (with_solution && task.settings.solver_check) quarter_steps = with_step(task.replays, 0.25);
-  for (const Replay& replay : quarter_steps) wanted.push_back({&replay, candidate});
-  if (with_solution && task.cells != nullptr)
-    for (const std::vector<Replay>* replays : {&task.cells->of_sheet, &task.cells->between})
-      for (const Replay& replay : *replays) wanted.push_back({&replay, candidate});
+  std::vector<std::vector<Replay>> of_solution;
+  if (with_solution) of_solution = replays_of_solution(task, values);
+  for (const std::vector<Replay>& replays : of_solution)
+    for (const Replay& replay : replays) wanted.push_back({&replay, candidate});
   for (const std::vector<double>& draw : draws_of(posterior))
     for (const Replay& replay : *of_draws) wanted.push_back({&replay, candidate_at(draw, task.grid)});
   task.store.prepare(wanted);

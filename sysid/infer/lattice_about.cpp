@@ -50,6 +50,21 @@ std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>&
   return emulator;
 }
 
+namespace {
+
+constexpr int kFollows = 3;  // of an estimate by the cells of its sheet
+
+/// Puts "half_sheet_cells" of `held` in place of that of `errors`.
+void take_cells(const std::vector<KnownError>& held, std::vector<KnownError>& errors) {
+  for (const KnownError& error : held)
+    if (error.name == half_sheet_cells)
+      std::replace_if(
+          errors.begin(), errors.end(), [](const KnownError& each) { return each.name == half_sheet_cells; },
+          error);
+}
+
+}  // namespace
+
 std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
                                const Extent& extent, const std::vector<double>& at,
                                std::vector<KnownError> errors, std::vector<KnownError>& held) {
@@ -59,8 +74,8 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   const Look first = look(extent, at);
   std::vector<FinerSettings> finer;
   if (task.settings.solver_check) finer = finer_settings(task.replays);
-  const bool knows_solution = std::any_of(held.begin(), held.end(), is_found_once),
-             knows_held = !std::all_of(held.begin(), held.end(), is_found_once);
+  const bool knows_solution = std::any_of(held.begin(), held.end(), is_of_solution),
+             knows_held = !std::all_of(held.begin(), held.end(), is_of_solution);
   simulate_ahead(task, emulator, first.posterior, finer, !knows_held, !knows_solution);
   std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values(), std::move(finer));
   if (!estimate) return std::nullopt;
@@ -77,6 +92,12 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
     errors.push_back(std::move(error));
   Look second = look(extent_of(first.posterior.axes), first.posterior.values());
+  for (int again = 0; again < kFollows && has_left_cells(second.posterior, held); ++again) {
+    const std::vector<double> values = second.posterior.values();
+    if (!follow_with_cells(task, values, held)) break;
+    take_cells(held, errors);
+    second = look(extent_of(second.posterior.axes), values);
+  }
   return Found{std::move(emulator), axes, std::move(second), std::move(*estimate), std::move(errors)};
 }
 
@@ -248,7 +269,7 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   for (const KnownError& error : found.estimate.errors)
     checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
   for (const KnownError& error : found.errors)
-    if (error.name == half_sheet_cells || error.name == quarter_step)
+    if (error.name == half_sheet_cells || error.name == quarter_sheet_cells || error.name == quarter_step)
       checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
   return checks;
 }

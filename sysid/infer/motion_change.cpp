@@ -1,6 +1,8 @@
 #include "sysid/infer/motion_change.h"
 
-#include "sysid/emulate/two_mesh_motions.h"
+#include <optional>
+
+#include "sysid/emulate/mesh_projection.h"
 
 namespace flash::sysid {
 namespace {
@@ -18,13 +20,13 @@ SheetShifts shifts_of(const MotionChange& change, std::size_t r, const Replay& r
   for (const MotionTerm& term : change) {
     const data::TriangleMesh& own = term.motions->replays[r].surface;
     const Motion& motion = term.motions->results[r].motion;
-    Eigen::SparseMatrix<double> to_mesh;
-    if (!are_alike(own, mesh)) to_mesh = prolongation(own, mesh);
+    std::optional<MeshProjection> to_mesh;
+    if (!are_alike(own, mesh)) to_mesh = projection(own, mesh);
     data::Points positions;
     for (std::size_t k = 0; k < shifts.size(); ++k) {
       const double t = replay.observations[k].t + time_offset;
       surface_at(motion, t, positions);
-      if (to_mesh.size() > 0) positions = (to_mesh * positions).eval();
+      if (to_mesh) positions = projected(*to_mesh, positions);
       shifts[k].positions += term.factor * positions;
       shifts[k].force += term.factor * force_at(motion, t);
     }

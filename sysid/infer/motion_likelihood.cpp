@@ -30,7 +30,8 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
     recording.bends.resize(errors.size());
     // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
     for (const KnownError& error : errors)
-      recording.sizes.push_back(error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1);
+      recording.sizes.push_back(error.spread *
+                                (error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1));
     std::vector<SheetShifts> corrections(errors.size());
     data::for_each_in_parallel(errors.size(), replay.settings.threads, [&](std::size_t e) {
       const double size = recording.sizes[e];

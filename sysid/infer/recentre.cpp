@@ -41,7 +41,7 @@ Found about_told_grasp(const Task& task, Found found, GridSettings& grid, std::v
     grid.centres = {{kSize, {*size}, false}};
     // What smaller cells change hardly depends on the size, and takes the longest.
     std::vector<KnownError> here;
-    std::copy_if(held.begin(), held.end(), std::back_inserter(here), is_found_once);
+    std::copy_if(held.begin(), held.end(), std::back_inserter(here), is_of_solution);
     std::optional<Found> there = look_about(task, extent_of(found.look.posterior.axes),
                                             found.look.posterior.values(), finer, {}, here);
     if (!there) {

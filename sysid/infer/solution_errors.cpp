@@ -5,6 +5,9 @@
 #include <memory>
 #include <utility>
 
+#include "sysid/emulate/mesh_projection.h"
+#include "sysid/infer/coarse_cells.h"
+
 namespace flash::sysid {
 namespace {
 
@@ -20,8 +23,8 @@ std::vector<ReplayResult> motions_on(const Task& task, const std::vector<Replay>
   return results;
 }
 
-/// Sum of the squares of b - a over the first vertices of both, at the steps that both keep.
-double squared_difference(const Motion& a, const Motion& b, Eigen::Index vertices) {
+/// Sum of the squares over the first vertices, at the steps that both keep.
+double squares_of(const Motion& a, const Motion& b, Eigen::Index vertices) {
   double sum = 0;
   for (std::size_t i = 0; i < std::min(a.positions.size(), b.positions.size()); ++i)
     if (a.positions[i].rows() > 0 && b.positions[i].rows() > 0)
@@ -29,67 +32,158 @@ double squared_difference(const Motion& a, const Motion& b, Eigen::Index vertice
   return sum;
 }
 
-KnownError error_of(const char* name, std::shared_ptr<const Motions> from, Motions to, bool corrects,
-                    double times = 1) {
-  return {{{-times, std::move(from)}, {times, std::make_shared<const Motions>(std::move(to))}},
-          true,
-          corrects,
-          {},
-          name};
+using Shared = std::shared_ptr<const Motions>;
+
+/// The estimate on other cells or with another step; null where a motion diverged.
+Shared shared_motions(const Task& task, const std::vector<Replay>& replays,
+                      const std::vector<double>& values) {
+  std::vector<ReplayResult> results = motions_on(task, replays, values);
+  if (results.empty()) return nullptr;
+  return std::make_shared<const Motions>(Motions{replays, std::move(results)});
 }
 
-// The way to no step, or cells of no size, over that to half of it.
-constexpr double kFirstOrder = 2, kSecondOrder = 4.0 / 3;
+KnownError error_of(const char* name, const Shared& from, const Shared& to, bool corrects, double times = 1) {
+  KnownError error{{{-times, from}, {times, to}}, true, corrects, {}, name};
+  return error;
+}
+
+// What lies beyond a difference between two meshes or steps, over it, where halving again leaves this share.
+double beyond(double ratio) { return ratio / (1 - ratio); }
+constexpr double kFirstOrder = 0.5, kSecondOrder = 0.25;
+
+/// Motions on other cells as the search's own mesh has them: on a sixteenth of the vertices.
+Shared on_own_mesh(const Task& task, const Motions& motions) {
+  Motions own{task.replays, motions.results};
+  for (std::size_t r = 0; r < own.replays.size(); ++r) {
+    const MeshProjection to_own = projection(motions.replays[r].surface, own.replays[r].surface);
+    for (data::Points& positions : own.results[r].motion.positions)
+      if (positions.rows() > 0) positions = projected(to_own, positions);
+  }
+  return std::make_shared<const Motions>(std::move(own));
+}
+
+/// What half of the cells of the sheet change; null where a motion diverged.
+struct Halving {
+  Shared before, after;
+  explicit operator bool() const { return before && after; }
+};
+
+Halving halving_at(const Task& task, const HalvedSheet& sheet, const std::vector<double>& values) {
+  const auto at = [&](const std::vector<Replay>& replays) -> Shared {
+    const Shared motions = shared_motions(task, replays, values);
+    return motions ? on_own_mesh(task, *motions) : nullptr;
+  };
+  return {at(sheet.before), at(sheet.after)};
+}
+
+bool has_other_cells(const Task& task) {
+  return task.settings.solver_check && task.cells != nullptr && !task.cells->halves.after.empty();
+}
 
 }  // namespace
 
-bool is_found_once(const KnownError& error) {
-  return error.name == half_sheet_cells || error.name == unsettled_cells || error.name == quarter_step;
-}
-
-std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values) {
-  if (!task.settings.solver_check) return {};
-  const auto at = [&](double share) {
-    std::vector<Replay> replays = with_step(task.replays, share);
-    std::vector<ReplayResult> motions = motions_on(task, replays, values);
-    return Motions{std::move(replays), std::move(motions)};
-  };
-  Motions half = at(0.5), quarter = at(0.25);
-  if (half.results.empty() || quarter.results.empty()) return {};
-  return {error_of(quarter_step, std::make_shared<const Motions>(std::move(half)), std::move(quarter), true,
-                   kFirstOrder)};
-}
-
-double observed_ratio(const std::vector<ReplayResult>& cells, const std::vector<ReplayResult>& halves,
-                      const std::vector<ReplayResult>& quarters) {
-  double first = 0, second = 0;
-  for (std::size_t r = 0; r < cells.size(); ++r) {
-    const Eigen::Index vertices = cells[r].motion.positions.front().rows();
-    first += squared_difference(cells[r].motion, halves[r].motion, vertices);
-    second += squared_difference(halves[r].motion, quarters[r].motion, vertices);
+double observed_ratio(const Difference& first, const Difference& second) {
+  double squares[2] = {0, 0};
+  for (std::size_t r = 0; r < first.from.size(); ++r) {
+    const Eigen::Index vertices = first.from[r].motion.positions.front().rows();
+    squares[0] += squares_of(first.from[r].motion, first.to[r].motion, vertices);
+    squares[1] += squares_of(second.from[r].motion, second.to[r].motion, vertices);
   }
-  return first > 0 ? std::sqrt(second / first) : 0;
+  return squares[0] > 0 ? std::sqrt(squares[1] / squares[0]) : 0;
 }
 
 std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulator,
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here) {
-  if (task.cells == nullptr || task.cells->of_sheet.empty()) return {};
+  if (!has_other_cells(task)) return {};
   std::vector<KnownError> errors;
-  const auto between = std::make_shared<const Motions>(
-      Motions{task.cells->between, motions_on(task, task.cells->between, values)});
-  if (between->results.empty()) return {};
-  // Both have the same cells at the grasp, whose error is that of the finer mesh.
-  if (auto halved = motions_on(task, task.cells->of_sheet, values); !halved.empty())
-    errors.push_back(
-        error_of(half_sheet_cells, between, {task.cells->of_sheet, std::move(halved)}, true, kSecondOrder));
+  const Halving first = halving_at(task, task.cells->halves, values);
+  if (first) {
+    const bool again = coarse_cells(task.replays, candidate_at(values, task.grid)).has_value();
+    const Halving second = again ? halving_at(task, task.cells->quarters, values) : Halving{};
+    if (!second) {
+      errors.push_back(error_of(half_sheet_cells, first.before, first.after, true, 1 + beyond(kSecondOrder)));
+    } else {
+      const double ratio = observed_ratio({first.before->results, first.after->results},
+                                          {second.before->results, second.after->results});
+      const double share = std::clamp(ratio, kSecondOrder, kFirstOrder);
+      errors.push_back(error_of(half_sheet_cells, first.before, first.after, true));
+      errors.push_back(error_of(quarter_sheet_cells, second.before, second.after, true, 1 + beyond(share)));
+      for (KnownError& error : errors) error.spread = share;
+      if (ratio > most_ratio)
+        errors.push_back(error_of(unsettled_cells, second.before, second.after, false, 1 + beyond(share)));
+    }
+    errors.front().found_at = values;
+  }
   if (emulator.share == own_mesh) return errors;
-  const std::vector<Replay> on_finer = replays_of(emulator);
-  std::vector<ReplayResult> finer = motions_on(task, on_finer, values);
-  if (!finer.empty() && observed_ratio(here, between->results, finer) > most_ratio)
+  const Shared half = shared_motions(task, task.cells->halves.before, values),
+               finer = shared_motions(task, replays_of(emulator), values);
+  if (half && finer && observed_ratio({here, half->results}, {half->results, finer->results}) > most_ratio)
     errors.push_back(error_of(unsettled_cells, std::make_shared<const Motions>(Motions{task.replays, here}),
-                              {on_finer, std::move(finer)}, false));
+                              finer, false));
   return errors;
+}
+
+bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& errors) {
+  constexpr double kFar = 0.25;  // standard deviations
+  const auto error = std::find_if(errors.begin(), errors.end(),
+                                  [](const KnownError& each) { return each.name == half_sheet_cells; });
+  if (error == errors.end() || !error->corrects) return false;
+  for (std::size_t k = 0; k < posterior.axes.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    const Eigen::ArrayXd draws = posterior.samples.col(column).array();
+    const double variance = (draws - draws.mean()).square().mean(),
+                 way = posterior.estimate[column] - coordinate_of(posterior.axes[k], error->found_at[k]);
+    if (way * way > kFar * kFar * variance) return true;
+  }
+  return false;
+}
+
+bool follow_with_cells(const Task& task, const std::vector<double>& values, std::vector<KnownError>& errors) {
+  const auto error = std::find_if(errors.begin(), errors.end(),
+                                  [](const KnownError& each) { return each.name == half_sheet_cells; });
+  if (error == errors.end() || !has_other_cells(task)) return false;
+  std::vector<WantedMotion> wanted;
+  const HalvedSheet& sheet = task.cells->halves;
+  for (const std::vector<Replay>* replays : {&sheet.before, &sheet.after})
+    for (const Replay& replay : *replays) wanted.push_back({&replay, candidate_at(values, task.grid)});
+  if (task.told) task.told({}, {-static_cast<int>(wanted.size()), 0});
+  task.store.prepare(wanted);
+  const Halving here = halving_at(task, sheet, values);
+  if (!here) return false;
+  error->terms[0].motions = here.before;
+  error->terms[1].motions = here.after;
+  error->found_at = values;
+  return true;
+}
+
+std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values) {
+  if (!task.settings.solver_check) return {};
+  const auto at = [&](const std::vector<Replay>& replays, double share) {
+    return shared_motions(task, with_step(replays, share), values);
+  };
+  const Shared half = at(task.replays, 0.5), quarter = at(task.replays, 0.25);
+  if (!half || !quarter) return {};
+  return {error_of(quarter_step, half, quarter, true, 1 + beyond(kFirstOrder))};
+}
+
+std::vector<std::vector<Replay>> replays_of_solution(const Task& task, const std::vector<double>& values) {
+  std::vector<std::vector<Replay>> all;
+  if (task.settings.solver_check) all.push_back(with_step(task.replays, 0.25));
+  if (!has_other_cells(task)) return all;
+  const auto add = [&](const HalvedSheet& sheet) {
+    all.push_back(sheet.before);
+    all.push_back(sheet.after);
+  };
+  add(task.cells->halves);
+  if (coarse_cells(task.replays, candidate_at(values, task.grid))) add(task.cells->quarters);
+  return all;
+}
+
+bool is_of_solution(const KnownError& error) {
+  const std::string& name = error.name;
+  return name == half_sheet_cells || name == quarter_sheet_cells || name == unsettled_cells ||
+         name == quarter_step;
 }
 
 }  // namespace flash::sysid

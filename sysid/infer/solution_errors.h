@@ -1,5 +1,4 @@
 #pragma once
-#include <optional>
 #include <vector>
 
 #include "sysid/infer/estimate_errors.h"
@@ -10,13 +9,27 @@ namespace flash::sysid {
 /// smaller cells there alone. `here`: the estimate on the search's own mesh, one motion a recording. Empty
 /// where the task has no other cells; what diverged is left out.
 ///
-/// "half_sheet_cells": by what half of the cells of the sheet moves it, those at the grasps apart, and a
-/// third more, as for an error of second order; motions are corrected by that. "unsettled_cells": the way to
-/// the finer mesh as a whole, where differences do not fall as the extrapolation to cells of no size assumes
-/// (observed_ratio above most_ratio).
+/// "half_sheet_cells": what half of the cells of the sheet change, those at the grasps apart. Motions are
+/// corrected by 4/3 of that, as for an error of second order, and one standard deviation is as much.
+/// "quarter_sheet_cells", where cells are coarse for the fold in which the sheet leaves the table: what
+/// halving them again changes, d_2 after d_1. Motions are corrected by
+///
+///     d_1 + d_2 / (1 - r),    r = |d_2| / |d_1|,  at least 1/4 and at most 1/2,
+///
+/// r for an error of second and of first order, and one standard deviation of each is r of it.
+/// "unsettled_cells": the way to the finer mesh at the grasps as a whole, or to the quarters, where
+/// differences do not fall as that assumes (observed_ratio above most_ratio).
 std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulator,
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here);
+
+/// Whether the estimate has left where "half_sheet_cells" was found, by more than a quarter of a standard
+/// deviation: cells of a search answer to a change of the material otherwise than smaller ones, so that what
+/// was found there is no longer what smaller cells change.
+bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& errors);
+
+/// "half_sheet_cells" of `errors` found anew, at `values`. False where a motion diverged: it stays then.
+bool follow_with_cells(const Task& task, const std::vector<double>& values, std::vector<KnownError>& errors);
 
 /// The error of the time step that half the step does not show: twice what a quarter of it changes then, so
 /// that motions are corrected by
@@ -27,20 +40,30 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
 /// where a motion diverged.
 std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values);
 
+/// What both simulate beside the estimate itself and half the step, a recording, at most; cells as often
+/// again as follow_with_cells does.
+inline constexpr int motions_of_solution = 7;
+
+/// Of which replays that is.
+std::vector<std::vector<Replay>> replays_of_solution(const Task& task, const std::vector<double>& values);
+
 /// Whether an error is one of these, which are found at the first estimate and kept.
-bool is_found_once(const KnownError& error);
+bool is_of_solution(const KnownError& error);
 
-/// How differences between motions fall as cells are halved, and halved again: |x_4 - x_2| / |x_2 - x_1|,
-/// over the vertices that all three meshes have, the first ones. An error of first order falls to 1/2, of
-/// second order to 1/4. One motion a recording.
-double observed_ratio(const std::vector<ReplayResult>& cells, const std::vector<ReplayResult>& halves,
-                      const std::vector<ReplayResult>& quarters);
+/// How differences between motions fall as cells are halved, and halved again: |second| / |first|, over the
+/// vertices that all meshes have, the first ones. An error of first order falls to 1/2, of second order to
+/// 1/4. One motion a recording.
+struct Difference {
+  const std::vector<ReplayResult>&from, &to;
+};
+double observed_ratio(const Difference& first, const Difference& second);
 
-/// From this ratio on the two halvings do not tell where the next ones lead. The extrapolation assumes 1/2,
-/// and what it leaves to chance, twice its last step, allows for no more than 3/4.
+/// From this ratio on the two halvings do not tell where the next ones lead. The extrapolation assumes no
+/// more than 1/2, and what it leaves to chance allows for no more than 3/4.
 inline constexpr double most_ratio = 0.75;
 
 inline constexpr const char* half_sheet_cells = "half_sheet_cells";
+inline constexpr const char* quarter_sheet_cells = "quarter_sheet_cells";
 inline constexpr const char* unsettled_cells = "unsettled_cells";
 inline constexpr const char* quarter_step = "quarter_step";
 

@@ -159,7 +159,7 @@ std::vector<data::Outline> grasp_outlines(const data::Recording& recording, cons
       if (grasp.select.corner || grasp.select.position) size = std::min(size, within);
       if (outlines.back().corners.empty() && !grasp.select.position) finer = kStraight;
     }
-    outlines.back().near = settings.grasp_cell.value_or(size / finer);
+    outlines.back().near = settings.grasp_cell.value_or(grasp.cell > 0 ? grasp.cell : size / finer);
     outlines.back().near_corner = outlines.back().near / kFinest;
   }
   return outlines;
@@ -190,7 +190,9 @@ void grade_towards_grasps(const ReplaySettings& settings, data::Recording& recor
     const std::optional<double> cell = data::parse_number(data::split(recording.mesh_spec, ":")[2]);
     place_mesh(data::remeshed(recording.mesh, *cell), recording);
   }
+  for (data::RecordedGrasp& grasp : recording.grasps) grasp.cell = 0;
   const std::vector<data::Outline> outlines = grasp_outlines(recording, settings);
+  for (std::size_t k = 0; k < outlines.size(); ++k) recording.grasps[k].cell = outlines[k].near;
   take(data::aligned_with(data::refined_towards(placed(recording), outlines), outlines), recording);
 }
 

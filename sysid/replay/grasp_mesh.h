@@ -33,7 +33,8 @@ void grade_towards_grasps(const ReplaySettings& settings, data::Recording& recor
 /// Half of the cells of a recorded sheet, nested in them.
 void halve_cells(data::Recording& recording);
 
-/// A part of the size of the cells at the grasps, nested in them: those elsewhere stay.
+/// A part of the size that grade_towards_grasps gave the cells at the grasps, nested in those of the
+/// recording: those elsewhere stay.
 void refine_grasps(const ReplaySettings& settings, double part, data::Recording& recording);
 
 /// Whether the size of a grasp can be varied: that of a clamped patch at a corner of a sheet.

@@ -74,11 +74,16 @@ OtherCells other_cells(const std::vector<Replay>& replays) {
   OtherCells cells;
   for (const Replay& replay : replays) {
     if (!are_graded(replay.recording, replay.settings)) return {};
-    data::Recording halved = replay.recording, between = replay.recording;
-    halve_cells(halved);
-    refine_grasps(replay.settings, 0.5, between);
-    cells.of_sheet.push_back(on_mesh(replay, std::move(halved), replay.settings));
-    cells.between.push_back(on_mesh(replay, std::move(between), replay.settings));
+    data::Recording sheet = replay.recording;
+    double part = 0.5;
+    for (HalvedSheet* const pair : {&cells.halves, &cells.quarters}) {
+      data::Recording before = sheet;
+      refine_grasps(replay.settings, part, before);
+      halve_cells(sheet);
+      pair->before.push_back(on_mesh(replay, std::move(before), replay.settings));
+      pair->after.push_back(on_mesh(replay, sheet, replay.settings));
+      part *= 0.5;
+    }
   }
   return cells;
 }

@@ -18,11 +18,17 @@ Replay on_half_the_cell(const Replay& replay);
 
 std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays);
 
+/// Replays before and after all cells that are not at the grasps were halved: those at the grasps have the
+/// same size in both.
+struct HalvedSheet {
+  std::vector<Replay> before, after;
+};
+
 /// Other cells of replays whose cells shrink towards grasps, of which on_half_the_cell leaves those of the
-/// sheet as they are; both empty where one is not such a replay.
+/// sheet as they are; all empty where one is not such a replay.
 struct OtherCells {
-  std::vector<Replay> of_sheet;  ///< all cells halved
-  std::vector<Replay> between;   ///< those at the grasps halved: halfway to on_half_the_cell
+  HalvedSheet halves;    ///< of the cells of the replays; `before`: halfway to on_half_the_cell
+  HalvedSheet quarters;  ///< of those of `halves.after`
 };
 OtherCells other_cells(const std::vector<Replay>& replays);
 

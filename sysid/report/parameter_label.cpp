@@ -40,6 +40,7 @@ std::string solver_check_label(const std::string& what) {
       {"estimate_itself", "simulated, not interpolated"},
       {"double_mesh", "cells of no size"},
       {"half_sheet_cells", "cells of the sheet halved"},
+      {"quarter_sheet_cells", "cells of the sheet halved again"},
       {"half_step", "half the time step"},
       {"quarter_step", "a quarter of the time step"},
       {"four_times_iterations", "four times the iterations"}};

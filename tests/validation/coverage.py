@@ -161,10 +161,14 @@ def recorded(runs, asset, kind, seed, wrong):
     return recording
 
 
+def run_name(seed, wrong):
+    return f"run_{seed}_{wrong or 'right'}"
+
+
 def searched(runs, asset, kind, seed, wrong=None):
     recording = recorded(runs, asset, kind, seed, wrong)
     weighed = () if wrong == "weight" else ("--hold", f"areal_density={WEIGHT}+-{SCALES}:measured")
-    summary = runs.grid(f"run_{seed}_{wrong or 'right'}", [recording], "--asset", asset, "--mesh", meshes_of(kind, seed)[1], *kind.searched_with,
+    summary = runs.grid(run_name(seed, wrong), [recording], "--asset", asset, "--mesh", meshes_of(kind, seed)[1], *kind.searched_with,
                         *axes(kind), *kind.held, *weighed, "--no-plan", "--rollouts", str(runs.out / "motions"))
     return {"seed": seed, "wrong": wrong, "truth": truth_of(kind, seed), "parameters": summary["parameters"],
             "noise": summary["recordings"][0]["noise_m"],
@@ -316,10 +320,14 @@ def main():
     bounded = seeds[:options.bounds if "young" in kind.ranges and kind.searched_with else 0]  # of strips
     left = None if options.minutes is None else options.minutes - (time.monotonic() - begin) / 60
     bounds = {}
-    for _, (twin, bound) in kept.each_in_time(done, jobs[first:], options.jobs, left):
-        found.append(twin)
-        if bound is not None:
-            bounds[twin["seed"]] = bound
+    # What an earlier call finished counts however little time there is.
+    finished = [job for job in jobs[first:] if (options.out / run_name(*job) / "summary.json").exists()]
+    others = [job for job in jobs[first:] if job not in finished]
+    for part, minutes in ((finished, None), (others, left)):
+        for _, (twin, bound) in kept.each_in_time(done, part, options.jobs, minutes):
+            found.append(twin)
+            if bound is not None:
+                bounds[twin["seed"]] = bound
     if first and found[0]["seed"] in bounded:
         bounds[found[0]["seed"]] = least_spread(runs, kind, found[0])
     rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}

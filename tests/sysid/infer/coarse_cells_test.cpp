@@ -20,13 +20,14 @@ TEST(CoarseCells, AreToldWhereTheFoldIsNotFarLarger) {
   ReplayCandidate candidate;
   candidate.material.areal_density = 0.2;
   const double cell = typical_cell(replays[0].recording.mesh);
-  const auto with_radius = [&](double radius) {
+  const auto with_radius = [&](double radius) -> std::string {
     candidate.material.bending_rigidity = 0.2 * 9.81 * radius * radius * radius;
-    return coarse_cells_text(replays, candidate);
+    const std::optional<CoarseCells> coarse = coarse_cells(replays, candidate);
+    return coarse ? coarse_cells_text(*coarse) : "";
   };
-  EXPECT_EQ(with_radius(1.01 * cell / 0.4), "");
-  EXPECT_NE(with_radius(0.99 * cell / 0.4).find("cells of 26.9 mm are coarse"), std::string::npos)
-      << with_radius(0.99 * cell / 0.4);
+  EXPECT_EQ(with_radius(1.01 * cell / 0.5), "");
+  EXPECT_NE(with_radius(0.99 * cell / 0.5).find("cells of 26.9 mm are coarse"), std::string::npos)
+      << with_radius(0.99 * cell / 0.5);
   EXPECT_EQ(with_radius(0), "");
 }
 

@@ -16,8 +16,10 @@ ReplayResult at_height(double height) {
 }
 
 TEST(SolutionErrors, TheObservedRatioIsThatOfBothHalvings) {
-  EXPECT_NEAR(observed_ratio({at_height(1)}, {at_height(1.5)}, {at_height(1.75)}), 0.5, 1e-14);
-  EXPECT_NEAR(observed_ratio({at_height(1)}, {at_height(1.5)}, {at_height(2.5)}), 2, 1e-14);
+  const std::vector<ReplayResult> cells = {at_height(1)}, halves = {at_height(1.5)},
+                                  quarters = {at_height(1.75)}, far = {at_height(2.5)};
+  EXPECT_NEAR(observed_ratio({cells, halves}, {halves, quarters}), 0.5, 1e-14);
+  EXPECT_NEAR(observed_ratio({cells, halves}, {halves, far}), 2, 1e-14);
 }
 
 TEST(SolutionErrors, TwoHalvingsOfTheStepLeadToNoStep) {
@@ -35,7 +37,7 @@ TEST(SolutionErrors, TwoHalvingsOfTheStepLeadToNoStep) {
   const std::vector<KnownError> errors = errors_of_step(task, values);
   ASSERT_EQ(errors.size(), 1u);
   EXPECT_TRUE(errors[0].corrects);
-  EXPECT_TRUE(is_found_once(errors[0]));
+  EXPECT_TRUE(is_of_solution(errors[0]));
   ASSERT_EQ(errors[0].terms.size(), 2u);
 
   // Where the sheet is at last, with the step, half of it, a quarter and a sixteenth.
@@ -55,6 +57,75 @@ TEST(SolutionErrors, TwoHalvingsOfTheStepLeadToNoStep) {
   // is left after the extrapolation is of second order.
   EXPECT_LT((half - exact).norm(), 0.6 * (own - exact).norm());
   EXPECT_LT((extrapolated - exact).norm(), 0.5 * (quarter - exact).norm());
+}
+
+/// A towel of 0.2 m on cells of 40 mm, lifted by a patch at its corner.
+std::vector<Replay> graded_lift(const data::TemporaryFolder& folder) {
+  SynthSettings settings;
+  settings.duration = 0.3;
+  settings.grasp_within = 0.02;
+  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.1, 0})};
+  const std::string mesh = "sheet:0.2x0.2:0.04";
+  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, short_lift_material(), settings, {});
+  save_synthetic(made, folder / "towel");
+  return {make_replay(data::load_recording(folder / "towel"), {})};
+}
+
+TEST(SolutionErrors, CellsAreHalvedTwiceWhereTheyAreCoarseAndFollowTheEstimate) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = graded_lift(folder), none;
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "2e-4:2e-2:3:log")};
+  const AnswerSettings settings;
+  const MotionStore store(folder / "motions");
+  const TellWork untold;
+  const OtherCells cells = other_cells(replays);
+  const Task task{replays, none, grid, grid.axes, settings, store, untold, &cells};
+  const auto errors_at = [&](double bending) {
+    return errors_of_cells(task, Emulator{}, {bending},
+                           {store.run(replays[0], candidate_at({bending}, grid))});
+  };
+
+  // A fold of 0.22 m.
+  const std::vector<KnownError> stiff = errors_at(2e-2);
+  ASSERT_EQ(stiff.size(), 1u);
+  EXPECT_EQ(stiff[0].name, half_sheet_cells);
+  EXPECT_NEAR(stiff[0].terms[1].factor, 4.0 / 3, 1e-12);
+  EXPECT_EQ(stiff[0].spread, 1);
+
+  // One of 47 mm.
+  std::vector<KnownError> limp = errors_at(2e-4);
+  ASSERT_GE(limp.size(), 2u);
+  EXPECT_EQ(limp[0].name, half_sheet_cells);
+  EXPECT_EQ(limp[0].terms[1].factor, 1);
+  EXPECT_EQ(limp[1].name, quarter_sheet_cells);
+  for (const KnownError& error : {limp[0], limp[1]}) {
+    EXPECT_TRUE(error.corrects);
+    EXPECT_TRUE(is_of_solution(error));
+    EXPECT_GE(error.spread, 0.25);
+    EXPECT_LE(error.spread, 0.5);
+  }
+  EXPECT_NEAR(limp[1].terms[1].factor, 1 / (1 - limp[1].spread), 1e-12);
+
+  // Posteriors of a deviation of a tenth, at the estimate where they were found and away from it.
+  const auto posterior_at = [&](double bending) {
+    Posterior posterior{grid.axes, {}, {}, {}};
+    const double at = std::log(bending);
+    posterior.estimate = Eigen::VectorXd::Constant(1, at);
+    posterior.samples.resize(2, 1);
+    posterior.samples << at - 0.1, at + 0.1;
+    return posterior;
+  };
+  EXPECT_FALSE(has_left_cells(posterior_at(2.04e-4), limp));
+  EXPECT_TRUE(has_left_cells(posterior_at(2.06e-4), limp));
+  const KnownError before = limp[0];
+  ASSERT_TRUE(follow_with_cells(task, {2.06e-4}, limp));
+  EXPECT_FALSE(has_left_cells(posterior_at(2.06e-4), limp));
+  EXPECT_EQ(limp[0].terms[1].factor, before.terms[1].factor);
+  const data::Points was = before.terms[1].motions->results[0].motion.positions.back(),
+                     is = limp[0].terms[1].motions->results[0].motion.positions.back();
+  EXPECT_GT((is - was).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 TEST(SolutionErrors, OfTheStepAreNotAskedForWithoutASolverCheck) {

@@ -69,13 +69,40 @@ TEST(HalfCell, TheSheetsCellsAreHalvedBesideTheSameCellsAtTheGrasp) {
   save_synthetic(made, folder / "lift");
   const std::vector<Replay> replays = {make_replay(data::load_recording(folder / "lift"), {})};
   const OtherCells cells = other_cells(replays);
-  ASSERT_EQ(cells.of_sheet.size(), 1u);
-  ASSERT_EQ(cells.between.size(), 1u);
-  const auto edges = [](const Replay& replay) { return data::edge_lengths(replay.recording.mesh); };
-  EXPECT_NEAR(edges(cells.of_sheet[0]).least, 0.5 * edges(replays[0]).least, 1e-12);
-  EXPECT_NEAR(edges(cells.of_sheet[0]).largest, 0.5 * edges(replays[0]).largest, 1e-12);
-  EXPECT_LT(edges(cells.between[0]).least, 0.75 * edges(replays[0]).least);
-  EXPECT_NEAR(edges(cells.between[0]).largest, edges(replays[0]).largest, 1e-12);
+  const auto largest = [](const Replay& replay) { return data::edge_lengths(replay.recording.mesh).largest; };
+  // Mean edge within half a millimetre of the corner of the patch.
+  const auto near = [](const Replay& replay) {
+    const data::TriangleMesh& sheet = replay.recording.mesh;
+    double sum = 0;
+    int count = 0;
+    for (const auto triangle : sheet.triangles.rowwise())
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::RowVector3d a = sheet.vertices.row(triangle[k]),
+                                 b = sheet.vertices.row(triangle[(k + 1) % 3]);
+        if ((0.5 * (a + b) - Eigen::RowVector3d(0.18, 0.18, 0)).norm() > 5e-4) continue;
+        sum += (b - a).norm();
+        ++count;
+      }
+    return sum / count;
+  };
+  const double widest = largest(replays[0]), narrowest = near(replays[0]);
+  // Triangles are bisected towards the grasp: their edges fall by powers of 2^-1/2.
+  constexpr double kBisected = 1.45;
+  double part = 1;
+  for (const HalvedSheet& pair : {cells.halves, cells.quarters}) {
+    ASSERT_EQ(pair.before.size(), 1u);
+    ASSERT_EQ(pair.after.size(), 1u);
+    EXPECT_NEAR(largest(pair.before[0]), part * widest, 1e-12);
+    part *= 0.5;
+    EXPECT_NEAR(largest(pair.after[0]), part * widest, 1e-12);
+    for (const Replay& replay : {pair.before[0], pair.after[0]}) {
+      EXPECT_GT(near(replay), part * narrowest / kBisected);
+      EXPECT_LT(near(replay), part * narrowest * kBisected);
+    }
+  }
+  const double finest = near(on_half_the_cell(replays[0]));
+  EXPECT_GT(finest, 0.25 * narrowest / kBisected);
+  EXPECT_LT(finest, 0.25 * narrowest * kBisected);
 }
 
 }  // namespace
