@@ -52,8 +52,6 @@ std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>&
 
 namespace {
 
-constexpr int kFollows = 3;  // of an estimate by the cells of its sheet
-
 /// Puts "half_sheet_cells" of `held` in place of that of `errors`.
 void take_cells(const std::vector<KnownError>& held, std::vector<KnownError>& errors) {
   for (const KnownError& error : held)
@@ -92,9 +90,8 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
     errors.push_back(std::move(error));
   Look second = look(extent_of(first.posterior.axes), first.posterior.values());
-  for (int again = 0; again < kFollows && has_left_cells(second.posterior, held); ++again) {
-    const std::vector<double> values = second.posterior.values();
-    if (!follow_with_cells(task, values, held)) break;
+  if (const std::vector<double> values = second.posterior.values();
+      has_left_cells(second.posterior, held) && follow_with_cells(task, values, held)) {
     take_cells(held, errors);
     second = look(extent_of(second.posterior.axes), values);
   }

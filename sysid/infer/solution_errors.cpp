@@ -125,7 +125,7 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
 }
 
 bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& errors) {
-  constexpr double kFar = 0.25;  // standard deviations
+  constexpr double kFar = 0.5;  // standard deviations
   const auto error = std::find_if(errors.begin(), errors.end(),
                                   [](const KnownError& each) { return each.name == half_sheet_cells; });
   if (error == errors.end() || !error->corrects) return false;

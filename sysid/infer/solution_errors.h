@@ -23,7 +23,7 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here);
 
-/// Whether the estimate has left where "half_sheet_cells" was found, by more than a quarter of a standard
+/// Whether the estimate has left where "half_sheet_cells" was found, by more than half of a standard
 /// deviation: cells of a search answer to a change of the material otherwise than smaller ones, so that what
 /// was found there is no longer what smaller cells change.
 bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& errors);

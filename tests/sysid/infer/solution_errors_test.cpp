@@ -117,11 +117,11 @@ TEST(SolutionErrors, CellsAreHalvedTwiceWhereTheyAreCoarseAndFollowTheEstimate) 
     posterior.samples << at - 0.1, at + 0.1;
     return posterior;
   };
-  EXPECT_FALSE(has_left_cells(posterior_at(2.04e-4), limp));
-  EXPECT_TRUE(has_left_cells(posterior_at(2.06e-4), limp));
+  EXPECT_FALSE(has_left_cells(posterior_at(2.09e-4), limp));
+  EXPECT_TRUE(has_left_cells(posterior_at(2.11e-4), limp));
   const KnownError before = limp[0];
-  ASSERT_TRUE(follow_with_cells(task, {2.06e-4}, limp));
-  EXPECT_FALSE(has_left_cells(posterior_at(2.06e-4), limp));
+  ASSERT_TRUE(follow_with_cells(task, {2.11e-4}, limp));
+  EXPECT_FALSE(has_left_cells(posterior_at(2.11e-4), limp));
   EXPECT_EQ(limp[0].terms[1].factor, before.terms[1].factor);
   const data::Points was = before.terms[1].motions->results[0].motion.positions.back(),
                      is = limp[0].terms[1].motions->results[0].motion.positions.back();
