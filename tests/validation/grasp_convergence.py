@@ -124,7 +124,7 @@ def convergence_row(runs, case):
 def truth_of(runs, case):
     """One recording on cells that nobody searches with."""
     name = "truth_" + "_".join(f"{key}_{value}" for key, value in case.items())
-    return runs.synth(name, asset_of(runs, case), "--mesh", mesh_of(case, 0.005), "--grasp-cell", "0.0005", "--grasp-shape", case["grasp"],
+    return runs.synth(name, asset_of(runs, case), "--mesh", mesh_of(case, 0.005), "--grasp-cell", "0.00025", "--grasp-shape", case["grasp"],
                       "--grasp-within", repr(PATCH), "--time-step", "0.0025", "--rate", "10", "--noise", "0.001", "--seed", "7",
                       *synthetic.settings(TRUTH))
 
