@@ -367,6 +367,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back(
         "the motion does not settle as the cells at the grasp shrink: the intervals take what smaller ones "
         "change as a whole; search on a finer mesh, or with a smaller --grasp-cell");
+  if (std::any_of(held.begin(), held.end(),
+                  [](const KnownError& error) { return error.name == unsettled_sheet_cells; }))
+    answer.warnings.emplace_back(
+        "the motion does not settle as the cells of the sheet are halved twice: the intervals take what the "
+        "second halving changes as a whole; search on a finer mesh");
 
   Posterior posterior = there.look.posterior;
   if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);

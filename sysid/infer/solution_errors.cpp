@@ -111,7 +111,8 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
       errors.push_back(error_of(quarter_sheet_cells, second.before, second.after, true, 1 + beyond(share)));
       for (KnownError& error : errors) error.spread = share;
       if (ratio > most_ratio)
-        errors.push_back(error_of(unsettled_cells, second.before, second.after, false, 1 + beyond(share)));
+        errors.push_back(
+            error_of(unsettled_sheet_cells, second.before, second.after, false, 1 + beyond(share)));
     }
     errors.front().found_at = values;
   }
@@ -130,6 +131,7 @@ bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& e
                                   [](const KnownError& each) { return each.name == half_sheet_cells; });
   if (error == errors.end() || !error->corrects) return false;
   for (std::size_t k = 0; k < posterior.axes.size(); ++k) {
+    if (posterior.axes[k].values.size() < 2) continue;
     const auto column = static_cast<Eigen::Index>(k);
     const Eigen::ArrayXd draws = posterior.samples.col(column).array();
     const double variance = (draws - draws.mean()).square().mean(),
@@ -183,7 +185,7 @@ std::vector<std::vector<Replay>> replays_of_solution(const Task& task, const std
 bool is_of_solution(const KnownError& error) {
   const std::string& name = error.name;
   return name == half_sheet_cells || name == quarter_sheet_cells || name == unsettled_cells ||
-         name == quarter_step;
+         name == unsettled_sheet_cells || name == quarter_step;
 }
 
 }  // namespace flash::sysid

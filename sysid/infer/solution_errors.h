@@ -17,8 +17,9 @@ namespace flash::sysid {
 ///     d_1 + d_2 / (1 - r),    r = |d_2| / |d_1|,  at least 1/4 and at most 1/2,
 ///
 /// r for an error of second and of first order, and one standard deviation of each is r of it.
-/// "unsettled_cells": the way to the finer mesh at the grasps as a whole, or to the quarters, where
-/// differences do not fall as that assumes (observed_ratio above most_ratio).
+/// "unsettled_cells": the way to the finer mesh at the grasps as a whole, where differences do not fall as
+/// the extrapolation to cells of no size assumes (observed_ratio above most_ratio). "unsettled_sheet_cells":
+/// the way from the halves to the quarters and beyond, likewise.
 std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulator,
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here);
@@ -47,7 +48,7 @@ inline constexpr int motions_of_solution = 7;
 /// Of which replays that is.
 std::vector<std::vector<Replay>> replays_of_solution(const Task& task, const std::vector<double>& values);
 
-/// Whether an error is one of these, which are found at the first estimate and kept.
+/// Whether an error is one of these, which are found at the first estimate and kept, or follow it.
 bool is_of_solution(const KnownError& error);
 
 /// How differences between motions fall as cells are halved, and halved again: |second| / |first|, over the
@@ -65,6 +66,7 @@ inline constexpr double most_ratio = 0.75;
 inline constexpr const char* half_sheet_cells = "half_sheet_cells";
 inline constexpr const char* quarter_sheet_cells = "quarter_sheet_cells";
 inline constexpr const char* unsettled_cells = "unsettled_cells";
+inline constexpr const char* unsettled_sheet_cells = "unsettled_sheet_cells";
 inline constexpr const char* quarter_step = "quarter_step";
 
 }  // namespace flash::sysid

@@ -48,4 +48,16 @@ inline Replay short_lift(const data::TemporaryFolder& folder,
   return make_replay(data::load_recording(folder / "lift"), replay);
 }
 
+/// A towel of 0.2 m on cells of 40 mm, lifted by a patch of 20 mm at its corner for `duration` [s].
+inline Replay short_corner_lift(const data::TemporaryFolder& folder, double duration) {
+  SynthSettings settings;
+  settings.duration = duration;
+  settings.grasp_within = 0.02;
+  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.1, 0})};
+  const std::string mesh = "sheet:0.2x0.2:0.04";
+  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, short_lift_material(), settings, {});
+  save_synthetic(made, folder / "towel");
+  return make_replay(data::load_recording(folder / "towel"), {});
+}
+
 }  // namespace flash::sysid

@@ -59,21 +59,9 @@ TEST(SolutionErrors, TwoHalvingsOfTheStepLeadToNoStep) {
   EXPECT_LT((extrapolated - exact).norm(), 0.5 * (quarter - exact).norm());
 }
 
-/// A towel of 0.2 m on cells of 40 mm, lifted by a patch at its corner.
-std::vector<Replay> graded_lift(const data::TemporaryFolder& folder) {
-  SynthSettings settings;
-  settings.duration = 0.3;
-  settings.grasp_within = 0.02;
-  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.1, 0})};
-  const std::string mesh = "sheet:0.2x0.2:0.04";
-  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, short_lift_material(), settings, {});
-  save_synthetic(made, folder / "towel");
-  return {make_replay(data::load_recording(folder / "towel"), {})};
-}
-
 TEST(SolutionErrors, CellsAreHalvedTwiceWhereTheyAreCoarseAndFollowTheEstimate) {
   const data::TemporaryFolder folder;
-  const std::vector<Replay> replays = graded_lift(folder), none;
+  const std::vector<Replay> replays = {short_corner_lift(folder, 0.3)}, none;
   GridSettings grid;
   grid.base.material = short_lift_material();
   grid.axes = {parse_axis("bending", "2e-4:2e-2:3:log")};

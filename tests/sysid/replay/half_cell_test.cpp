@@ -60,14 +60,7 @@ TEST(HalfCell, SplitsTheTetrahedraOfAFile) {
 
 TEST(HalfCell, TheSheetsCellsAreHalvedBesideTheSameCellsAtTheGrasp) {
   const data::TemporaryFolder folder;
-  SynthSettings settings;
-  settings.duration = 0.1;
-  settings.grasp_within = 0.02;
-  settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.1, 0})};
-  const std::string mesh = "sheet:0.2x0.2:0.04";
-  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, short_lift_material(), settings, {});
-  save_synthetic(made, folder / "lift");
-  const std::vector<Replay> replays = {make_replay(data::load_recording(folder / "lift"), {})};
+  const std::vector<Replay> replays = {short_corner_lift(folder, 0.1)};
   const OtherCells cells = other_cells(replays);
   const auto largest = [](const Replay& replay) { return data::edge_lengths(replay.recording.mesh).largest; };
   // Mean edge within half a millimetre of the corner of the patch.
