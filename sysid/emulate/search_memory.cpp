@@ -4,6 +4,8 @@
 
 #include "sysid/emulate/focused_axes.h"
 #include "sysid/emulate/two_mesh_motions.h"
+#include "sysid/replay/coarse_cells.h"
+#include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 
@@ -20,6 +22,29 @@ double kept_steps(const Replay& replay) {
   const std::vector<bool> read = steps_read(replay, replay.start, replay.settings.solver.time_step,
                                             static_cast<std::size_t>(replay.steps) + 1);
   return static_cast<double>(std::count(read.begin(), read.end(), true));
+}
+
+/// The candidate that bends most easily.
+ReplayCandidate limpest(const GridSettings& settings) {
+  std::vector<double> values;
+  for (const Axis& axis : settings.axes)
+    values.push_back(*std::min_element(axis.values.begin(), axis.values.end()));
+  return candidate_at(values, settings);
+}
+
+/// Of the estimate on other cells of the sheet, which are in work side by side: those with half and, where
+/// cells may be coarse, a quarter of the cells [bytes].
+double other_cells_bytes(const std::vector<Replay>& replays, const GridSettings& settings) {
+  std::vector<double> factors = {kFiner, 1};  // vertices of each, over those of the search's mesh
+  if (coarse_cells(replays, limpest(settings))) factors = {kFiner * kFiner, kFiner, kFiner, 1};
+  double bytes = 0;
+  int threads = settings.threads;
+  for (const double factor : factors)
+    for (const Replay& replay : replays) {
+      bytes += factor * motion_bytes(replay);
+      if (threads-- > 0) bytes += factor * solver_bytes(replay);
+    }
+  return bytes;
 }
 
 }  // namespace
@@ -49,6 +74,8 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
     estimate.steps = std::max(estimate.steps, vertices_finer * at_once * motion);
     estimate.simulation =
         std::max(estimate.simulation, solver_finer * threads * solver + vertices_finer * at_once * motion);
+    if (are_graded(replays))
+      estimate.simulation = std::max(estimate.simulation, other_cells_bytes(replays, settings));
   }
   const std::vector<Axis> emulated = most_focused(settings.axes);
   const double finer = solver_check ? count_candidates(thinned(emulated)) : 0;

@@ -7,7 +7,7 @@
 namespace flash::sysid {
 
 /// Before anything is simulated: from vertices, steps and candidates. `solver_check`: whether the answer is
-/// solved again, on half the cell too.
+/// solved again, on half the cell too and, of a graded mesh, on smaller cells of the sheet.
 MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSettings& settings,
                                bool solver_check);
 

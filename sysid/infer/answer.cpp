@@ -6,7 +6,6 @@
 #include "data/text.h"
 #include "sysid/emulate/focused_axes.h"
 #include "sysid/infer/adaptive_design.h"
-#include "sysid/infer/coarse_cells.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/lattice_about.h"
@@ -267,8 +266,7 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
                                const AnswerSettings& settings, const TellWork& told) {
   const MotionStore store(grid.rollouts);
   const std::vector<Replay> finer = finer_replays(replays, settings);
-  const OtherCells cells = settings.solver_check ? other_cells(replays) : OtherCells();
-  const Task task{replays, finer, grid, grid.axes, settings, store, told, &cells};
+  const Task task{replays, finer, grid, grid.axes, settings, store, told};
   Extent extent = around;
   std::vector<double> at = start;
   std::vector<KnownError> held;
@@ -323,8 +321,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
       settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
   usable.axes = focused(usable.axes, best);
   const std::vector<Replay> finer = finer_replays(replays, settings);
-  const OtherCells cells = settings.solver_check ? other_cells(replays) : OtherCells();
-  const Task task{replays, finer, usable, ranges, settings, store, told, &cells};
+  const Task task{replays, finer, usable, ranges, settings, store, told};
   std::optional<Emulator> emulator;
   if (settings.solver_check)
     emulator = emulator_over(task, usable.axes, first_on_finer_mesh(usable.axes, ranges, best), false);
@@ -362,16 +359,6 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         " on the same mesh: errors of the cells, of the step and of what is held decide "
         "between them; search on a finer mesh, with a shorter step, or what is held too");
   warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
-  if (std::any_of(held.begin(), held.end(),
-                  [](const KnownError& error) { return error.name == unsettled_cells; }))
-    answer.warnings.emplace_back(
-        "the motion does not settle as the cells at the grasp shrink: the intervals take what smaller ones "
-        "change as a whole; search on a finer mesh, or with a smaller --grasp-cell");
-  if (std::any_of(held.begin(), held.end(),
-                  [](const KnownError& error) { return error.name == unsettled_sheet_cells; }))
-    answer.warnings.emplace_back(
-        "the motion does not settle as the cells of the sheet are halved twice: the intervals take what the "
-        "second halving changes as a whole; search on a finer mesh");
 
   Posterior posterior = there.look.posterior;
   if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);
@@ -386,11 +373,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.open_information =
       open_information(at_fit, spreads_over(ranges, extent_of(there.look.posterior.axes)));
   answer.parameters = findings_of(results, ranges, posterior, grid.base);
-  if (std::any_of(answer.parameters.begin(), answer.parameters.end(), [](const ParameterFinding& finding) {
-        return finding.name == "friction" && finding.identifiable != Identifiable::no;
-      }))
-    if (const auto coarse = coarse_cells(replays, candidate_at(answer.values, usable)))
-      answer.warnings.push_back(coarse_cells_text(*coarse));
+  warn_of_cells(task, answer.values, held, answer.warnings);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, there);

@@ -7,7 +7,6 @@
 #include "sysid/infer/answer.h"
 #include "sysid/infer/motion_likelihood.h"
 #include "sysid/infer/solver_check.h"
-#include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 
@@ -29,7 +28,6 @@ struct Task {
   const AnswerSettings& settings;
   const MotionStore& store;
   const TellWork& told;
-  const OtherCells* cells = nullptr;  ///< of `replays`; null: none
 
   void tell_motion() const {
     if (told) told({1, 0}, {});

@@ -50,19 +50,6 @@ std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>&
   return emulator;
 }
 
-namespace {
-
-/// Puts "half_sheet_cells" of `held` in place of that of `errors`.
-void take_cells(const std::vector<KnownError>& held, std::vector<KnownError>& errors) {
-  for (const KnownError& error : held)
-    if (error.name == half_sheet_cells)
-      std::replace_if(
-          errors.begin(), errors.end(), [](const KnownError& each) { return each.name == half_sheet_cells; },
-          error);
-}
-
-}  // namespace
-
 std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
                                const Extent& extent, const std::vector<double>& at,
                                std::vector<KnownError> errors, std::vector<KnownError>& held) {
@@ -85,14 +72,17 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
     add_to_held(errors_of_step(task, first.posterior.values()));
     add_to_held(errors_of_cells(task, emulator, first.posterior.values(), estimate->motions));
   }
-  errors = estimate->errors;
-  errors.insert(errors.end(), held.begin(), held.end());
-  for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
-    errors.push_back(std::move(error));
+  const std::vector<KnownError> at_draws = errors_at_draws(task, emulator, *estimate, first.posterior);
+  const auto take_all = [&] {
+    errors = estimate->errors;
+    for (const std::vector<KnownError>* more : {&std::as_const(held), &at_draws})
+      errors.insert(errors.end(), more->begin(), more->end());
+  };
+  take_all();
   Look second = look(extent_of(first.posterior.axes), first.posterior.values());
   if (const std::vector<double> values = second.posterior.values();
       has_left_cells(second.posterior, held) && follow_with_cells(task, values, held)) {
-    take_cells(held, errors);
+    take_all();
     second = look(extent_of(second.posterior.axes), values);
   }
   return Found{std::move(emulator), axes, std::move(second), std::move(*estimate), std::move(errors)};

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <utility>
 
 #include "sysid/emulate/mesh_projection.h"
-#include "sysid/infer/coarse_cells.h"
+#include "sysid/replay/coarse_cells.h"
+#include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 namespace {
@@ -76,8 +78,48 @@ Halving halving_at(const Task& task, const HalvedSheet& sheet, const std::vector
   return {at(sheet.before), at(sheet.after)};
 }
 
-bool has_other_cells(const Task& task) {
-  return task.settings.solver_check && task.cells != nullptr && !task.cells->halves.after.empty();
+bool has_other_cells(const Task& task) { return task.settings.solver_check && are_graded(task.replays); }
+
+bool are_coarse(const Task& task, const std::vector<double>& values) {
+  return coarse_cells(task.replays, candidate_at(values, task.grid)).has_value();
+}
+
+using Errors = std::vector<KnownError>;
+
+Errors::const_iterator find(const Errors& errors, const char* name) {
+  return std::find_if(errors.begin(), errors.end(),
+                      [&](const KnownError& error) { return error.name == name; });
+}
+
+bool has(const Errors& errors, const char* name) { return find(errors, name) != errors.end(); }
+
+bool is_of_sheet(const KnownError& error) {
+  return error.name == half_sheet_cells || error.name == quarter_sheet_cells ||
+         error.name == unsettled_sheet_cells;
+}
+
+/// Those that is_of_sheet; none where half of the cells diverge.
+Errors errors_of_sheet(const Task& task, const std::vector<double>& values) {
+  Errors errors;
+  const Halving first = halving_at(task, halved_sheet(task.replays, 1), values);
+  if (!first) return errors;
+  const Halving second =
+      are_coarse(task, values) ? halving_at(task, halved_sheet(task.replays, 2), values) : Halving{};
+  if (!second) {
+    errors.push_back(error_of(half_sheet_cells, first.before, first.after, true, 1 + beyond(kSecondOrder)));
+  } else {
+    const double ratio = observed_ratio({first.before->results, first.after->results},
+                                        {second.before->results, second.after->results});
+    const double share = std::clamp(ratio, kSecondOrder, kFirstOrder);
+    errors.push_back(error_of(half_sheet_cells, first.before, first.after, true));
+    errors.push_back(error_of(quarter_sheet_cells, second.before, second.after, true, 1 + beyond(share)));
+    for (KnownError& error : errors) error.spread = share;
+    if (ratio > most_ratio)
+      errors.push_back(
+          error_of(unsettled_sheet_cells, second.before, second.after, false, 1 + beyond(share)));
+  }
+  errors.front().found_at = values;
+  return errors;
 }
 
 }  // namespace
@@ -96,28 +138,9 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here) {
   if (!has_other_cells(task)) return {};
-  std::vector<KnownError> errors;
-  const Halving first = halving_at(task, task.cells->halves, values);
-  if (first) {
-    const bool again = coarse_cells(task.replays, candidate_at(values, task.grid)).has_value();
-    const Halving second = again ? halving_at(task, task.cells->quarters, values) : Halving{};
-    if (!second) {
-      errors.push_back(error_of(half_sheet_cells, first.before, first.after, true, 1 + beyond(kSecondOrder)));
-    } else {
-      const double ratio = observed_ratio({first.before->results, first.after->results},
-                                          {second.before->results, second.after->results});
-      const double share = std::clamp(ratio, kSecondOrder, kFirstOrder);
-      errors.push_back(error_of(half_sheet_cells, first.before, first.after, true));
-      errors.push_back(error_of(quarter_sheet_cells, second.before, second.after, true, 1 + beyond(share)));
-      for (KnownError& error : errors) error.spread = share;
-      if (ratio > most_ratio)
-        errors.push_back(
-            error_of(unsettled_sheet_cells, second.before, second.after, false, 1 + beyond(share)));
-    }
-    errors.front().found_at = values;
-  }
+  Errors errors = errors_of_sheet(task, values);
   if (emulator.share == own_mesh) return errors;
-  const Shared half = shared_motions(task, task.cells->halves.before, values),
+  const Shared half = shared_motions(task, halved_sheet(task.replays, 1).before, values),
                finer = shared_motions(task, replays_of(emulator), values);
   if (half && finer && observed_ratio({here, half->results}, {half->results, finer->results}) > most_ratio)
     errors.push_back(error_of(unsettled_cells, std::make_shared<const Motions>(Motions{task.replays, here}),
@@ -127,8 +150,7 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
 
 bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& errors) {
   constexpr double kFar = 0.5;  // standard deviations
-  const auto error = std::find_if(errors.begin(), errors.end(),
-                                  [](const KnownError& each) { return each.name == half_sheet_cells; });
+  const auto error = find(errors, half_sheet_cells);
   if (error == errors.end() || !error->corrects) return false;
   for (std::size_t k = 0; k < posterior.axes.size(); ++k) {
     if (posterior.axes[k].values.size() < 2) continue;
@@ -142,20 +164,29 @@ bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& e
 }
 
 bool follow_with_cells(const Task& task, const std::vector<double>& values, std::vector<KnownError>& errors) {
-  const auto error = std::find_if(errors.begin(), errors.end(),
-                                  [](const KnownError& each) { return each.name == half_sheet_cells; });
-  if (error == errors.end() || !has_other_cells(task)) return false;
+  if (!has_other_cells(task) || !has(errors, half_sheet_cells)) return false;
+  const bool coarse_by_now = are_coarse(task, values) && !has(errors, quarter_sheet_cells);
+  std::vector<HalvedSheet> sheets = {halved_sheet(task.replays, 1)};
+  if (coarse_by_now) sheets.push_back(halved_sheet(task.replays, 2));
   std::vector<WantedMotion> wanted;
-  const HalvedSheet& sheet = task.cells->halves;
-  for (const std::vector<Replay>* replays : {&sheet.before, &sheet.after})
-    for (const Replay& replay : *replays) wanted.push_back({&replay, candidate_at(values, task.grid)});
+  for (const HalvedSheet& sheet : sheets)
+    for (const std::vector<Replay>* replays : {&sheet.before, &sheet.after})
+      for (const Replay& replay : *replays) wanted.push_back({&replay, candidate_at(values, task.grid)});
   if (task.told) task.told({}, {-static_cast<int>(wanted.size()), 0});
   task.store.prepare(wanted);
-  const Halving here = halving_at(task, sheet, values);
+  if (coarse_by_now) {
+    Errors there = errors_of_sheet(task, values);
+    if (there.empty()) return false;
+    std::erase_if(errors, is_of_sheet);
+    std::move(there.begin(), there.end(), std::back_inserter(errors));
+    return true;
+  }
+  const Halving here = halving_at(task, sheets.front(), values);
   if (!here) return false;
-  error->terms[0].motions = here.before;
-  error->terms[1].motions = here.after;
-  error->found_at = values;
+  KnownError& error = errors[static_cast<std::size_t>(find(errors, half_sheet_cells) - errors.begin())];
+  error.terms[0].motions = here.before;
+  error.terms[1].motions = here.after;
+  error.found_at = values;
   return true;
 }
 
@@ -173,19 +204,40 @@ std::vector<std::vector<Replay>> replays_of_solution(const Task& task, const std
   std::vector<std::vector<Replay>> all;
   if (task.settings.solver_check) all.push_back(with_step(task.replays, 0.25));
   if (!has_other_cells(task)) return all;
-  const auto add = [&](const HalvedSheet& sheet) {
-    all.push_back(sheet.before);
-    all.push_back(sheet.after);
-  };
-  add(task.cells->halves);
-  if (coarse_cells(task.replays, candidate_at(values, task.grid))) add(task.cells->quarters);
+  for (int times = 1; times <= (are_coarse(task, values) ? 2 : 1); ++times) {
+    HalvedSheet sheet = halved_sheet(task.replays, times);
+    all.push_back(std::move(sheet.before));
+    all.push_back(std::move(sheet.after));
+  }
   return all;
 }
 
+void warn_of_cells(const Task& task, const std::vector<double>& values, const std::vector<KnownError>& errors,
+                   std::vector<std::string>& warnings) {
+  if (has(errors, unsettled_cells))
+    warnings.emplace_back(
+        "the motion does not settle as the cells at the grasp shrink: the intervals take what smaller ones "
+        "change as a whole; search on a finer mesh, or with a smaller --grasp-cell");
+  if (has(errors, unsettled_sheet_cells))
+    warnings.emplace_back(
+        "the motion does not settle as the cells of the sheet are halved twice: the intervals take what the "
+        "second halving changes as a whole; search on a finer mesh");
+  const auto coarse = coarse_cells(task.replays, candidate_at(values, task.grid));
+  if (coarse) warnings.push_back(coarse_cells_text(*coarse));
+  if (!has_other_cells(task)) return;
+  if (!has(errors, half_sheet_cells))
+    warnings.emplace_back(
+        "the motion on half of the cells of the sheet diverges: the answer is not corrected for the cells of "
+        "the sheet, nor do the intervals allow for them; search on a finer mesh, or with a shorter "
+        "--time-step");
+  else if (coarse && !has(errors, quarter_sheet_cells))
+    warnings.emplace_back(
+        "the cells of the sheet are coarse, and were halved once alone: the motion on a quarter of them "
+        "diverges, or was not asked for; search on a finer mesh");
+}
+
 bool is_of_solution(const KnownError& error) {
-  const std::string& name = error.name;
-  return name == half_sheet_cells || name == quarter_sheet_cells || name == unsettled_cells ||
-         name == unsettled_sheet_cells || name == quarter_step;
+  return is_of_sheet(error) || error.name == unsettled_cells || error.name == quarter_step;
 }
 
 }  // namespace flash::sysid

@@ -1,4 +1,5 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "sysid/infer/estimate_errors.h"
@@ -29,7 +30,8 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
 /// was found there is no longer what smaller cells change.
 bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& errors);
 
-/// "half_sheet_cells" of `errors` found anew, at `values`. False where a motion diverged: it stays then.
+/// "half_sheet_cells" of `errors` found anew, at `values`, with all that is halved twice where cells are
+/// coarse there and were not before. False where a motion diverged: what there is stays then.
 bool follow_with_cells(const Task& task, const std::vector<double>& values, std::vector<KnownError>& errors);
 
 /// The error of the time step that half the step does not show: twice what a quarter of it changes then, so
@@ -47,6 +49,11 @@ inline constexpr int motions_of_solution = 7;
 
 /// Of which replays that is.
 std::vector<std::vector<Replay>> replays_of_solution(const Task& task, const std::vector<double>& values);
+
+/// Names what cells leave open at an estimate: where the motion does not settle, where cells are coarse for
+/// the fold of the sheet, and where smaller ones diverge.
+void warn_of_cells(const Task& task, const std::vector<double>& values, const std::vector<KnownError>& errors,
+                   std::vector<std::string>& warnings);
 
 /// Whether an error is one of these, which are found at the first estimate and kept, or follow it.
 bool is_of_solution(const KnownError& error);

@@ -1,5 +1,7 @@
 #include "sysid/replay/half_cell.h"
 
+#include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -70,22 +72,23 @@ std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays) {
   return halves;
 }
 
-OtherCells other_cells(const std::vector<Replay>& replays) {
-  OtherCells cells;
+bool are_graded(const std::vector<Replay>& replays) {
+  return std::all_of(replays.begin(), replays.end(),
+                     [](const Replay& replay) { return are_graded(replay.recording, replay.settings); });
+}
+
+HalvedSheet halved_sheet(const std::vector<Replay>& replays, int times) {
+  HalvedSheet halves;
   for (const Replay& replay : replays) {
-    if (!are_graded(replay.recording, replay.settings)) return {};
     data::Recording sheet = replay.recording;
-    double part = 0.5;
-    for (HalvedSheet* const pair : {&cells.halves, &cells.quarters}) {
-      data::Recording before = sheet;
-      refine_grasps(replay.settings, part, before);
-      halve_cells(sheet);
-      pair->before.push_back(on_mesh(replay, std::move(before), replay.settings));
-      pair->after.push_back(on_mesh(replay, sheet, replay.settings));
-      part *= 0.5;
-    }
+    for (int time = 1; time < times; ++time) halve_cells(sheet);
+    data::Recording before = sheet;
+    refine_grasps(replay.settings, std::ldexp(1.0, -times), before);
+    halve_cells(sheet);
+    halves.before.push_back(on_mesh(replay, std::move(before), replay.settings));
+    halves.after.push_back(on_mesh(replay, std::move(sheet), replay.settings));
   }
-  return cells;
+  return halves;
 }
 
 }  // namespace flash::sysid

@@ -24,12 +24,12 @@ struct HalvedSheet {
   std::vector<Replay> before, after;
 };
 
-/// Other cells of replays whose cells shrink towards grasps, of which on_half_the_cell leaves those of the
-/// sheet as they are; all empty where one is not such a replay.
-struct OtherCells {
-  HalvedSheet halves;    ///< of the cells of the replays; `before`: halfway to on_half_the_cell
-  HalvedSheet quarters;  ///< of those of `halves.after`
-};
-OtherCells other_cells(const std::vector<Replay>& replays);
+/// Whether the cells of all replays shrink towards grasps, so that on_half_the_cell leaves those of the sheet
+/// as they are.
+bool are_graded(const std::vector<Replay>& replays);
+
+/// The cells of the sheet of graded replays halved so many times, at least once: of the cells of the replays,
+/// of the halves. `before` of the first time is halfway to on_half_the_cell.
+HalvedSheet halved_sheet(const std::vector<Replay>& replays, int times);
 
 }  // namespace flash::sysid

@@ -58,5 +58,21 @@ TEST(SearchMemory, GrowsWithWhatIsInWorkAtOnce) {
   EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * several);
 }
 
+TEST(SearchMemory, CountsAQuarterOfTheCellsOfASheetThatMayBeLimpForThem) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_corner_lift(folder, 0.3)};
+  const auto simulation = [&](const std::string& bending) {
+    GridSettings grid = grid_over(bending);
+    grid.threads = 1;
+    grid.envs = 1;
+    return estimate_memory(replays, grid, true).simulation;
+  };
+  const double a_motion = motion_bytes(replays.front()),
+               solver = sim::solver_bytes_per_vertex * vertices_of(replays.front());
+  // One solver of sixteen times the vertices, and the motions of four meshes.
+  EXPECT_DOUBLE_EQ(simulation("2e-4:2e-2:2:log"), 16 * solver + (16 + 4 + 4 + 1) * a_motion);
+  EXPECT_LT(simulation("1e-2:2e-2:2:log"), 16 * solver);
+}
+
 }  // namespace
 }  // namespace flash::sysid

@@ -68,8 +68,7 @@ TEST(SolutionErrors, CellsAreHalvedTwiceWhereTheyAreCoarseAndFollowTheEstimate) 
   const AnswerSettings settings;
   const MotionStore store(folder / "motions");
   const TellWork untold;
-  const OtherCells cells = other_cells(replays);
-  const Task task{replays, none, grid, grid.axes, settings, store, untold, &cells};
+  const Task task{replays, none, grid, grid.axes, settings, store, untold};
   const auto errors_at = [&](double bending) {
     return errors_of_cells(task, Emulator{}, {bending},
                            {store.run(replays[0], candidate_at({bending}, grid))});
@@ -114,6 +113,28 @@ TEST(SolutionErrors, CellsAreHalvedTwiceWhereTheyAreCoarseAndFollowTheEstimate) 
   const data::Points was = before.terms[1].motions->results[0].motion.positions.back(),
                      is = limp[0].terms[1].motions->results[0].motion.positions.back();
   EXPECT_GT((is - was).cwiseAbs().maxCoeff(), 1e-6);
+
+  // From where cells are not coarse to where they are.
+  std::vector<KnownError> arrived = stiff;
+  ASSERT_TRUE(follow_with_cells(task, {2e-4}, arrived));
+  ASSERT_EQ(arrived.size(), limp.size());
+  for (std::size_t e = 0; e < limp.size(); ++e) {
+    EXPECT_EQ(arrived[e].name, limp[e].name);
+    EXPECT_EQ(arrived[e].spread, limp[e].spread);
+  }
+
+  const auto warnings_at = [&](double bending, const std::vector<KnownError>& errors) {
+    std::vector<std::string> warnings;
+    warn_of_cells(task, {bending}, errors, warnings);
+    return warnings;
+  };
+  EXPECT_TRUE(warnings_at(2e-2, stiff).empty());
+  ASSERT_EQ(warnings_at(2e-4, {limp[0], limp[1]}).size(), 1u);  // they are coarse
+  const std::vector<std::string> once = warnings_at(2e-4, stiff), never = warnings_at(2e-2, {});
+  ASSERT_EQ(once.size(), 2u);
+  EXPECT_NE(once[1].find("halved once alone"), std::string::npos);
+  ASSERT_EQ(never.size(), 1u);
+  EXPECT_NE(never[0].find("not corrected for the cells of the sheet"), std::string::npos);
 }
 
 TEST(SolutionErrors, OfTheStepAreNotAskedForWithoutASolverCheck) {

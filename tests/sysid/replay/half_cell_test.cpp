@@ -61,7 +61,7 @@ TEST(HalfCell, SplitsTheTetrahedraOfAFile) {
 TEST(HalfCell, TheSheetsCellsAreHalvedBesideTheSameCellsAtTheGrasp) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_corner_lift(folder, 0.1)};
-  const OtherCells cells = other_cells(replays);
+  ASSERT_TRUE(are_graded(replays));
   const auto largest = [](const Replay& replay) { return data::edge_lengths(replay.recording.mesh).largest; };
   // Mean edge within half a millimetre of the corner of the patch.
   const auto near = [](const Replay& replay) {
@@ -82,7 +82,7 @@ TEST(HalfCell, TheSheetsCellsAreHalvedBesideTheSameCellsAtTheGrasp) {
   // Triangles are bisected towards the grasp: their edges fall by powers of 2^-1/2.
   constexpr double kBisected = 1.45;
   double part = 1;
-  for (const HalvedSheet& pair : {cells.halves, cells.quarters}) {
+  for (const HalvedSheet& pair : {halved_sheet(replays, 1), halved_sheet(replays, 2)}) {
     ASSERT_EQ(pair.before.size(), 1u);
     ASSERT_EQ(pair.after.size(), 1u);
     EXPECT_NEAR(largest(pair.before[0]), part * widest, 1e-12);

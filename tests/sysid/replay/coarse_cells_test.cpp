@@ -1,4 +1,4 @@
-#include "sysid/infer/coarse_cells.h"
+#include "sysid/replay/coarse_cells.h"
 
 #include <gtest/gtest.h>
 
