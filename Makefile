@@ -21,7 +21,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
-.PHONY: grasp-convergence grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
+.PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -32,9 +32,8 @@ demo: configure  ## Packages, build, then the main job on depth frames it makes 
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(sysid) synth --asset examples/towel.json --mesh sheet:0.3x0.3:0.01 --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
 	$(sysid) segment $(DEMO)/recording/camera1 --trajectory $(DEMO)/recording/gripper.tum --times rate:10 --force -o $(DEMO)/segmented
-	$(sysid) import $(DEMO)/segmented/frames --trajectory $(DEMO)/recording/gripper.tum --times rate:10 \
-	  --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 --table-z 0 --crop-z 0.008: \
-	  --offset-bound 0.005 --force -o $(DEMO)/lift
+	$(sysid) import $(DEMO)/segmented/frames --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 \
+	  --crop-z 0.008: --offset-bound 0.005 --force -o $(DEMO)/lift
 	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 \
 	  --hold areal_density=0.2:measured --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
@@ -82,6 +81,10 @@ agreement: configure-test  ## Say whether searches of two recordings tell one cl
 grasp-convergence: configure-test  ## Say how far cells move D of a corner lift, of motions and of searches, and how far the stated size of the patch does
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/grasp_convergence.py --sysid $(sysid) --out $(BUILD)/grasp_convergence --documents docs/validation $(if $(ONLY),--only $(ONLY))
+
+cells: configure-test  ## Say whether segment and import take rendered cells whose inputs belong together, and refuse those with a wrong one
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/cells.py --sysid $(sysid) --out $(BUILD)/cells --documents docs/validation
 
 grasp-shapes: configure-test  ## Say whether compare tells how strips were grasped, RUNS of them from SEED on
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid

@@ -34,8 +34,13 @@ std::vector<double> even_times(const std::string& times, std::size_t frames) {
 
 }  // namespace
 
-std::vector<double> frame_times(const std::string& times, std::size_t frames) {
-  return times.starts_with("rate:") ? even_times(times, frames) : data::load_frame_times(times, frames);
+std::vector<double> frame_times(const std::string& times, const std::vector<std::string>& files) {
+  if (!times.starts_with("rate:")) return data::load_frame_times(times, files.size());
+  std::vector<double> even = even_times(times, files.size());
+  if (const std::string gap = data::gap_in_names(files); !gap.empty())
+    throw data::InputError("--times: found \"" + times + "\", but " + gap +
+                           ": expected a CSV file with the time of each frame that is there");
+  return even;
 }
 
 }  // namespace flash

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "data/procedural_mesh.h"
 #include "data/text.h"
 #include "data/trajectory.h"
+#include "sysid/capture/segmented_cell.h"
 
 namespace flash {
 namespace {
@@ -72,6 +74,66 @@ data::Trajectory load_gripper(const std::string& path) {
   return trajectory;
 }
 
+bool are_equal(const data::Trajectory& a, const data::Trajectory& b) {
+  if (a.times.size() != b.times.size()) return false;
+  for (std::size_t k = 0; k < a.times.size(); ++k)
+    if (std::abs(a.times[k] - b.times[k]) > 1e-6 ||
+        !a.poses[k].translation().isApprox(b.poses[k].translation(), 1e-6))
+      return false;
+  return true;
+}
+
+bool are_equal(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](double x, double y) { return std::abs(x - y) < 1e-6; });
+}
+
+/// Takes what `segment` knows of the cell for what is not given, and compares it with what is.
+void take_segmented(const std::string& file, sysid::ImportSettings& settings) {
+  constexpr double kTable = 0.02;  // by which two heights of one table differ at most [m]
+  const sysid::SegmentedCell cell = sysid::load_segmented_cell(file);
+  const auto differs = [&](const char* option, const std::string& how) {
+    const std::string text = std::string(option) + ": " + how + " " + file;
+    if (!settings.accept_unusable)
+      throw data::InputError(text + ", with which the clouds were segmented; --force takes it as it is");
+    settings.taken.push_back("warning: " + text);
+  };
+  std::vector<std::string> taken;
+  if (settings.trajectory.poses.empty()) {
+    if (cell.trajectory.empty())
+      throw data::InputError("import: expected --trajectory: " + file + " has none");
+    settings.trajectory = load_gripper(cell.trajectory);
+    settings.trajectory_path = cell.trajectory;
+    taken.emplace_back("the trajectory");
+  } else if (!cell.trajectory.empty() && !are_equal(settings.trajectory, load_gripper(cell.trajectory))) {
+    differs("--trajectory", "found " + settings.trajectory_path + ", which is another than that of");
+  }
+  if (cell.times.size() > 0 && cell.times.size() != settings.clouds.size())
+    throw data::InputError(file + ": times: found " + std::to_string(cell.times.size()) + ", expected " +
+                           std::to_string(settings.clouds.size()) + ", one a cloud beside it");
+  if (settings.times.empty() && !cell.times.empty()) {
+    settings.times = cell.times;
+    taken.emplace_back("the times");
+  } else if (!cell.times.empty() && !are_equal(settings.times, cell.times)) {
+    differs("--times", "found others than those of");
+  }
+  if (cell.table) {
+    const double height = sysid::height_under(*cell.table, settings.trajectory.poses.front().translation());
+    if (!settings.table_height) {
+      settings.table_height = height;
+      taken.push_back("the table's height, " + data::format_short(std::round(1e4 * height) / 1e4) + " m,");
+    } else if (std::abs(*settings.table_height - height) > kTable) {
+      differs("--table-z", "found " + data::format_short(*settings.table_height) + " m, expected " +
+                               data::format_short(std::round(1e4 * height) / 1e4) + " m, as in");
+    }
+  }
+  settings.cameras = cell.cameras;
+  if (taken.empty()) return;
+  std::string list = taken[0];
+  for (std::size_t k = 1; k < taken.size(); ++k) list += (k + 1 == taken.size() ? " and " : ", ") + taken[k];
+  settings.taken.push_back(list + (taken.size() == 1 ? " is" : " are") + " from " + file);
+}
+
 }  // namespace
 
 data::Selection parse_grasp(const std::string& text) {
@@ -114,14 +176,26 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
   settings.grasp = parse_grasp(options.grasp);
   settings.grasp.within = options.within.value_or(data::Selection().within);
   settings.crop = parse_crop(options.crop);
-  settings.trajectory = load_gripper(options.trajectory);
-  settings.trajectory_path = options.trajectory;
   if (options.clouds.empty() == options.depth.empty())
     throw data::InputError("import: expected either a folder of clouds or --depth");
   if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");
   if (!options.depth.empty()) settings.depth = files_in(options.depth, {".png"}, "depth");
+  const std::string segmented =
+      options.clouds.empty() ? std::string() : sysid::segmented_cell_of(options.clouds);
+  if (options.trajectory.empty() && segmented.empty())
+    throw data::InputError("import: expected --trajectory, or --markers in place of clouds");
+  if (!options.trajectory.empty()) {
+    settings.trajectory = load_gripper(options.trajectory);
+    settings.trajectory_path = options.trajectory;
+  }
   if (!options.times.empty())
-    settings.times = frame_times(options.times, settings.clouds.size() + settings.depth.size());
+    settings.times = frame_times(options.times, options.depth.empty() ? settings.clouds : settings.depth);
+  if (!segmented.empty()) take_segmented(segmented, settings);
+  if (settings.times.empty())
+    if (const std::string gap = data::gap_in_names(options.depth.empty() ? settings.clouds : settings.depth);
+        !gap.empty())
+      throw data::InputError("--times: found none, but " + gap +
+                             ": expected a CSV file with the time of each frame that is there");
   if (!options.depth.empty() && (settings.intrinsics.empty() || settings.extrinsics.empty()))
     throw data::InputError("import: --depth needs --intrinsics and --extrinsics");
 }

@@ -104,8 +104,6 @@ int import_markers(const CLI::App& verb, ImportVerbOptions options) {
 
 int run_import(const CLI::App& verb, ImportVerbOptions options) {
   if (!options.tracks.tracks.empty()) return import_markers(verb, std::move(options));
-  if (options.texts.trajectory.empty())
-    throw data::InputError("import: expected --trajectory, or --markers in place of clouds");
   sysid::ImportSettings& settings = options.settings;
   settings.overwrite = settings.accept_unusable = options.common.force;
   if (!options.offset.empty()) settings.nuisance.offset = parse_bounds(options.offset);
@@ -141,8 +139,9 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--depth-scale", settings.depth_scale, "Metres per count of the depth images")
       ->check(positive_number())
       ->capture_default_str();
-  CLI::Option* trajectory =
-      verb->add_option("--trajectory", texts.trajectory, "Poses of the gripper, T_base_gripper, TUM or CSV");
+  CLI::Option* trajectory = verb->add_option(
+      "--trajectory", texts.trajectory,
+      "Poses of the gripper, T_base_gripper, TUM or CSV; without it as the clouds were segmented");
   sysid::TrackImportSettings& tracks = options->tracks;
   CLI::Option* markers = verb->add_option("--markers", tracks.tracks,
                                           "Tracks of markers on a part that is clamped, in place of clouds: "
@@ -165,7 +164,8 @@ void add_import_verb(CLI::App& app, Action& action) {
       ->needs(markers);
   verb->add_option(
       "--times", texts.times,
-      "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
+      "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it as the clouds "
+      "were segmented, else rate:10");
   verb->add_option("--mesh", texts.mesh,
                    "Mesh of the sheet, sheet:WIDTHxHEIGHT:CELL [m], of the part with --markers, as "
                    "box:LENGTHxWIDTHxHEIGHT:CELL, or a file; from corner 0,0 or 1,1, seen from "
@@ -185,9 +185,10 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--crop-x", texts.crop[0], "Keep points in LOW:HIGH [m], either may be empty");
   verb->add_option("--crop-y", texts.crop[1], "Keep points in LOW:HIGH [m], either may be empty");
   verb->add_option("--crop-z", texts.crop[2], "Keep points in LOW:HIGH [m], either may be empty, as 0.075:");
-  verb->add_option(
-          "--table-z", options->table_height,
-          "Height of the table in the base frame [m]; without it from the gripper's start and the crop")
+  verb->add_option("--table-z", options->table_height,
+                   "Height of the table in the base frame [m]; without it as segment found it, else from the "
+                   "gripper's "
+                   "start and the crop")
       ->check(any_number());
   verb->add_option("--heading", options->heading_degrees,
                    "Direction of the sheet's diagonal from the grasped corner, turned from x [deg]; without "

@@ -123,6 +123,10 @@ std::vector<sysid::Overlay> keep_estimate(const std::vector<std::string>& record
   for (std::size_t r = 0; r < answer.fit.replays.size(); ++r) {
     overlays.push_back(sysid::make_overlay(answer.fit.replays[r], answer.fit.motions[r].motion,
                                            answer.fit.score.recordings[r]));
+    const fs::path picture = fs::path(answer.fit.replays[r].recording.source).parent_path() / "import.svg";
+    std::error_code unknown;
+    if (fs::is_regular_file(picture, unknown))
+      overlays.back().start_picture = data::read_file(picture.string());
     sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / folders[r]).string());
   }
   return overlays;

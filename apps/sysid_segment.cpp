@@ -71,13 +71,16 @@ std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
   return views;
 }
 
-/// One a frame. Without a gripper they do not count, and need not be known.
-std::vector<double> times_of(const SegmentOptions& options, std::size_t frames) {
+/// One a frame; empty where they are not given. Without a gripper they do not count.
+std::vector<double> times_of(const SegmentOptions& options, const std::vector<sysid::RawView>& views) {
   if (options.times.empty() && !options.trajectory.empty())
     throw data::InputError(
         "--trajectory: the frames need times by its clock, expected --times FILE.csv or rate:HZ:START, or "
         "rate:HZ where the first frame is at 0 s");
-  return frame_times(options.times.empty() ? "rate:1" : options.times, frames);
+  std::vector<double> times;
+  for (const sysid::RawView& view : views)
+    if (!options.times.empty()) times = frame_times(options.times, view.files);
+  return times;
 }
 
 void check_lengths(const SegmentOptions& options) {
@@ -110,8 +113,10 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
   }
   data::check_folder_free(options.out, options.common.force);
   check_places(views, options.out);
+  settings.accept_fault = options.common.force;
+  settings.told = [&](const std::string& text) { say(options.common, text); };
   const sysid::SegmentedFolder segmented =
-      sysid::segment_folder(views, times_of(options, views.front().files.size()), settings, options.out);
+      sysid::segment_folder(views, times_of(options, views), settings, options.out);
   for (const std::string& warning : segmented.warnings) warn(warning);  // those of the cameras too
 
   std::size_t points = 0;

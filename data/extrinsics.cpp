@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
 #include "data/trajectory.h"
@@ -57,15 +58,22 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
 }
 
 CameraPose load_camera_pose(const std::string& path, bool accept_unusable) {
+  CameraPose pose;
   if (lower_extension(path) == ".json") {
     const nlohmann::json json = load_json(path);
     const JsonObject file(json, path);
     if (file.string("setup", "") == "eye-in-hand")
       throw file.error("setup", "\"eye-to-hand\": this camera moves with the gripper");
-    return read_camera_pose(file, accept_unusable);
+    pose = read_camera_pose(file, accept_unusable);
+  } else {
+    pose.transform = {.parent = "base", .child = "camera", .T = load_trajectory(path).poses.front()};
   }
-  CameraPose pose;
-  pose.transform = {.parent = "base", .child = "camera", .T = load_trajectory(path).poses.front()};
+  constexpr double kFarthest = 20;  // from which no camera of a cell looks on [m]
+  if (const double distance = pose.transform.T.translation().norm(); distance > kFarthest)
+    throw input_error(path, "translation",
+                      "found a camera " + format_short(distance) +
+                          " m from the robot's base, expected at most " + format_short(kFarthest) +
+                          " m: are these millimetres?");
   return pose;
 }
 

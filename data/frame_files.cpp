@@ -56,6 +56,38 @@ std::vector<std::string> files_in_order(const std::string& folder,
   return files;
 }
 
+std::string gap_in_names(const std::vector<std::string>& files) {
+  // The last run of digits of a name: a count, or a time stamp, which jitters.
+  const auto number_in = [](const std::string& file) -> std::optional<double> {
+    const std::string name = fs::path(file).stem().string();
+    const std::size_t last = name.find_last_of("0123456789");
+    if (last == std::string::npos) return std::nullopt;
+    std::size_t first = name.find_last_not_of("0123456789", last);
+    if (first != std::string::npos && name[first] == '.')  // 1764000000.25
+      first = name.find_last_not_of("0123456789.", last);
+    return parse_number(std::string_view(name).substr(first + 1, last - first));
+  };
+  std::vector<double> steps;
+  std::size_t widest = 0;
+  std::optional<double> before;
+  for (const std::string& file : files) {
+    const std::optional<double> number = number_in(file);
+    if (!number) return "";
+    if (before) {
+      steps.push_back(*number - *before);
+      if (steps.back() > steps[widest]) widest = steps.size() - 1;
+    }
+    before = number;
+  }
+  if (steps.size() < 2) return "";
+  const double longest = steps[widest];
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  if (!(longest > 1.5 * *middle)) return "";
+  return "no frame between " + fs::path(files[widest]).filename().string() + " and " +
+         fs::path(files[widest + 1]).filename().string();
+}
+
 std::vector<double> load_frame_times(const std::string& path, std::size_t frames) {
   const std::string text = read_file(path);
   LineReader lines(text);

@@ -17,6 +17,8 @@
 #include "data/text.h"
 #include "data/writable.h"
 #include "sysid/capture/clocks.h"
+#include "sysid/capture/import_checks.h"
+#include "sysid/capture/import_picture.h"
 #include "sysid/capture/lying_sheet.h"
 #include "sysid/replay/grasp_mesh.h"
 
@@ -222,8 +224,8 @@ void copy_files(const fs::path& out, data::Recording& recording) {
 data::Recording import_recording(const ImportSettings& settings) {
   const fs::path out(settings.out);
   const std::string path = (out / "recording.json").string();
-  std::vector<std::string> names = {"recording.json", "frames",           "depth",
-                                    "mask",           "camera_info.yaml", "gripper.tum"};
+  std::vector<std::string> names = {"recording.json",   "frames",      "depth",     "mask",
+                                    "camera_info.yaml", "gripper.tum", "import.svg"};
   if (!data::is_mesh_spec(settings.mesh_spec))
     names.push_back(fs::path(settings.mesh_spec).filename().string());
   data::check_names_free(settings.out, names, settings.overwrite);
@@ -305,6 +307,10 @@ data::Recording import_recording(const ImportSettings& settings) {
   data::StagedFolder staged(settings.out);
   copy_files(staged.path(), recording);
   check_as_file(recording, (fs::path(staged.path()) / "recording.json").string(), doubt);
+  for (const std::string& text : contradictions(recording, keyframes)) {
+    if (!settings.accept_unusable) throw data::InputError("import: " + text + " --force takes it as it is");
+    notices.push_back("import: warning: " + text);
+  }
   if (!settings.asset.empty()) {
     if (!fs::exists(settings.asset))
       throw data::InputError("--asset: found \"" + settings.asset + "\", expected a file");
@@ -312,9 +318,14 @@ data::Recording import_recording(const ImportSettings& settings) {
     recording.asset = (fs::path(staged.path()) / data::relative_path(settings.asset, path)).string();
   }
   data::save_recording(recording, (fs::path(staged.path()) / "recording.json").string());
+  std::vector<Eigen::Vector3d> cameras = settings.cameras;
+  if (recording.camera) cameras.emplace_back(recording.camera->base_from_camera.translation());
+  data::write_atomically((fs::path(staged.path()) / "import.svg").string(),
+                         draw_import(recording, keyframes, cameras));
   staged.publish("recording.json");
   data::Recording written = data::load_recording(path);
   written.notices.insert(written.notices.end(), notices.begin(), notices.end());
+  for (const std::string& text : settings.taken) written.notices.push_back("import: " + text);
   for (const std::string& guess : guesses) written.notices.push_back("import: guessed: " + guess);
   return written;
 }

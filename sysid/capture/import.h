@@ -41,13 +41,17 @@ struct ImportSettings {
   std::string name;  ///< empty: the folder's
   std::string out;   ///< folder to make
   bool overwrite = false;
-  bool accept_unusable = false;  ///< extrinsics that flash-calib ended with exit code 3
+  bool accept_unusable = false;  ///< extrinsics that flash-calib ended with exit code 3, and contradictions
+  std::vector<Eigen::Vector3d> cameras;  ///< that made the clouds, base frame [m]; for the picture
+  std::vector<std::string> taken;        ///< what came from elsewhere than its option, for people to read
 };
 
-/// Writes out/recording.json with its frames, trajectory and camera copied beside it, and loads it back to
-/// check it. The start pose is a guess: flat on the table, the grasped corner under the gripper, the diagonal
-/// along `heading`; notices say what was guessed, and where first clouds, of a sheet that still lies, fit it
-/// better with its sides changed over. Throws InputError, and leaves nothing behind, where the check fails.
+/// Writes out/recording.json with its frames, trajectory and camera copied beside it, and a picture of what a
+/// search will start from, import.svg, and loads it back to check it. The start pose is a guess: flat on the
+/// table, the grasped corner under the gripper, the diagonal along `heading`; notices say what was guessed,
+/// and where first clouds, of a sheet that still lies, fit it better with its sides changed over. Throws
+/// InputError, and leaves nothing behind, where the check fails and where inputs contradict each other
+/// (import_checks.h) and are not accepted so.
 data::Recording import_recording(const ImportSettings& settings);
 
 }  // namespace flash::sysid

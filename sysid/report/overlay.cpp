@@ -22,6 +22,10 @@ std::string table_path(const std::string& folder) {
   return (std::filesystem::path(folder) / "overlay.csv").string();
 }
 
+std::string picture_path(const std::string& folder) {
+  return (std::filesystem::path(folder) / "import.svg").string();
+}
+
 constexpr std::string_view header = "t,score_m,points";
 
 }  // namespace
@@ -55,6 +59,7 @@ void save_overlay(const Overlay& overlay, const std::string& folder) {
     table += data::format_number(frame.t) + "," + data::format_number(frame.score) + "," +
              std::to_string(frame.cloud.rows()) + "\n";
   }
+  if (!overlay.start_picture.empty()) data::write_atomically(picture_path(folder), overlay.start_picture);
   data::write_atomically(table_path(folder), table);
 }
 
@@ -67,6 +72,8 @@ Overlay load_overlay(const std::string& folder) {
     throw data::InputError(path + ": line 1: expected \"" + std::string(header) + "\"");
   Overlay overlay;
   overlay.name = std::filesystem::path(folder).filename().string();
+  if (std::filesystem::is_regular_file(picture_path(folder)))
+    overlay.start_picture = data::read_file(picture_path(folder));
   while (lines.next(line)) {
     const std::vector<std::string_view> words = data::split(line, ",");
     const auto t = words.size() == 3 ? data::parse_number(words[0]) : std::nullopt;

@@ -21,12 +21,14 @@ struct Overlay {
   std::string name;
   data::Triangles triangles;
   std::vector<OverlayFrame> frames;
+  std::string start_picture = {};  ///< SVG of what the search started from, as `import` drew it; may be empty
 };
 
 /// The simulated surface at each keyframe under the registration that `score` found.
 Overlay make_overlay(const Replay& replay, const Motion& motion, const RecordingScore& score);
 
-/// FOLDER/NNN_mesh.ply, NNN_cloud.ply and overlay.csv (t, score_m, points), NNN the index of the keyframe.
+/// FOLDER/NNN_mesh.ply, NNN_cloud.ply and overlay.csv (t, score_m, points), NNN the index of the keyframe,
+/// and import.svg where there is one.
 void save_overlay(const Overlay& overlay, const std::string& folder);
 
 /// Throws data::InputError naming the file unless save_overlay wrote the folder.

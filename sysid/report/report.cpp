@@ -175,6 +175,7 @@ Json overlays_of(const std::vector<Overlay>& overlays, int max_cloud_points) {
     const std::vector<int> triangles(overlay.triangles.data(),
                                      overlay.triangles.data() + overlay.triangles.size());
     list.push_back({{"name", overlay.name}, {"triangles", triangles}, {"frames", frames}});
+    if (!overlay.start_picture.empty()) list.back()["start"] = overlay.start_picture;
   }
   return list;
 }

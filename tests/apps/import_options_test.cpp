@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <functional>
 #include <limits>
+#include <utility>
 
+#include "sysid/capture/segmented_cell.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash {
@@ -46,7 +49,7 @@ TEST(ImportOptions, EitherSideOfACropMayBeOpen) {
 class ImportOptionsOfAFolder : public testing::Test {
  protected:
   ImportOptionsOfAFolder() {
-    for (const char* name : {"clouds/2.ply", "clouds/10.pcd", "clouds/11.ply", "clouds/notes.txt"})
+    for (const char* name : {"clouds/9.ply", "clouds/10.pcd", "clouds/11.ply", "clouds/notes.txt"})
       folder_.write(name, "");
     options_.clouds = folder_ / "clouds";
     options_.trajectory = folder_.write("tcp.tum", "0 0.5 0.1 0.052 0 0 0 1\n1 0.5 0.1 0.1 0 0 0 1\n");
@@ -65,10 +68,55 @@ class ImportOptionsOfAFolder : public testing::Test {
   ImportOptions options_;
 };
 
+TEST_F(ImportOptionsOfAFolder, TakeWhatTheCloudsWereSegmentedWith) {
+  sysid::SegmentedCell cell;
+  cell.table = {{0, 0, 0.05}, Eigen::Vector3d::UnitZ()};
+  cell.times = {0, 0.1, 0.2};
+  cell.trajectory = options_.trajectory;
+  cell.cameras = {{0, 0, 1}};
+  save_segmented_cell(cell, folder_ / "segment.json");
+  const auto read = [&](const auto& change, bool accept) {
+    ImportOptions options = options_;
+    sysid::ImportSettings settings;
+    settings.accept_unusable = accept;
+    change(options, settings);
+    read_options(options, settings);
+    return settings;
+  };
+  const sysid::ImportSettings taken =
+      read([](ImportOptions& options, auto&) { options.trajectory = ""; }, false);
+  EXPECT_EQ(taken.times, cell.times);
+  EXPECT_EQ(taken.table_height, 0.05);
+  EXPECT_EQ(taken.trajectory.poses.size(), 2u);
+  EXPECT_EQ(taken.cameras, cell.cameras);
+  ASSERT_EQ(taken.taken.size(), 1u);
+  EXPECT_TRUE(
+      taken.taken[0].starts_with("the trajectory, the times and the table's height, 0.05 m, are from "));
+
+  const std::string other = folder_.write("other.tum", "0 0.5 0.1 0.052 0 0 0 1\n1 0.5 0.2 0.1 0 0 0 1\n");
+  const std::vector<std::pair<const char*, std::function<void(ImportOptions&, sysid::ImportSettings&)>>>
+      others = {{"--trajectory", [&](ImportOptions& options, auto&) { options.trajectory = other; }},
+                {"--times", [](ImportOptions& options, auto&) { options.times = "rate:15"; }},
+                {"--table-z",
+                 [](ImportOptions&, sysid::ImportSettings& settings) { settings.table_height = 0.17; }}};
+  for (const auto& [option, change] : others) {
+    EXPECT_TRUE(data::input_error_of([&] { read(change, false); }).starts_with(option)) << option;
+    EXPECT_TRUE(read(change, true).taken[0].starts_with("warning: " + std::string(option))) << option;
+  }
+  EXPECT_EQ(
+      read([](auto&, sysid::ImportSettings& settings) { settings.table_height = 0.06; }, false).table_height,
+      0.06);
+  cell.times.pop_back();
+  save_segmented_cell(cell, folder_ / "segment.json");
+  EXPECT_NE(
+      data::input_error_of([&] { read([](auto&, auto&) {}, false); }).find("times: found 2, expected 3"),
+      std::string::npos);
+}
+
 TEST_F(ImportOptionsOfAFolder, BecomeValues) {
   sysid::ImportSettings settings;
   read_options(options_, settings);
-  EXPECT_EQ(settings.clouds, (std::vector<std::string>{folder_ / "clouds/2.ply", folder_ / "clouds/10.pcd",
+  EXPECT_EQ(settings.clouds, (std::vector<std::string>{folder_ / "clouds/9.ply", folder_ / "clouds/10.pcd",
                                                        folder_ / "clouds/11.ply"}));
   EXPECT_TRUE(settings.depth.empty());
   EXPECT_TRUE(settings.times.empty());

@@ -39,6 +39,19 @@ TEST_F(ExtrinsicsFile, APlaceThatNoCameraHasIsRefused) {
             path + ": transform.translation: found [1e+300,0.1,1], expected metres, below 10,000");
 }
 
+TEST_F(ExtrinsicsFile, ACameraInMillimetresIsRefused) {
+  const std::string text = R"({"schema": "flash-extrinsics/2", "transform": {"translation": [450, 30, 750],
+                               "rotation_xyzw": [0, 0, 0, 1]}})";
+  const TemporaryFolder folder;
+  const std::string json = folder.write("camera.json", text),
+                    tum = folder.write("camera.tum", "0 450 30 750 0 0 0 1\n");
+  for (const std::string& path : {json, tum})
+    EXPECT_EQ(input_error_of([&] { load_camera_pose(path, true); }),
+              path +
+                  ": translation: found a camera 875.2 m from the robot's base, expected at most 20 m: are "
+                  "these millimetres?");
+}
+
 TEST_F(ExtrinsicsFile, AnAnswerThatCannotBeUsedIsRefusedUnlessAccepted) {
   const std::string bad = R"(, "exit_code": 3, "warnings": ["rotations turn about one axis only", "second"])";
   EXPECT_EQ(refusal(bad),

@@ -22,6 +22,20 @@ TEST(FrameFiles, NumbersCountInNames) {
             std::string::npos);
 }
 
+TEST(FrameFiles, AGapIsAStepFarLongerThanTheOthers) {
+  EXPECT_EQ(gap_in_names({"f/a1.png", "f/a2.png", "f/a4.png", "f/a5.png"}),
+            "no frame between a2.png and a4.png");
+  EXPECT_EQ(gap_in_names({"1.png", "2.png", "3.png"}), "");
+  EXPECT_EQ(gap_in_names({"10.png", "20.png", "30.png"}), "");  // one in ten was kept
+  EXPECT_EQ(gap_in_names({"1.png", "3.png"}), "");
+  EXPECT_EQ(gap_in_names({"start.png", "middle.png", "end.png"}), "");
+  // Time stamps jitter.
+  EXPECT_EQ(gap_in_names({"1764000000.000.png", "1764000000.093.png", "1764000000.205.png"}), "");
+  EXPECT_EQ(gap_in_names({"1764000000.000.png", "1764000000.093.png", "1764000000.305.png"}),
+            "no frame between 1764000000.093.png and 1764000000.305.png");
+  EXPECT_EQ(gap_in_names({"depth_0_15.png", "depth_0_16.png", "depth_0_17.png"}), "");
+}
+
 TEST(FrameFiles, TimesAreAColumnOfAFile) {
   const TemporaryFolder folder;
   const std::string path = folder.write("times.csv", "frame,t_s\n0,0.01\n1,0.11\n2,0.19\n");

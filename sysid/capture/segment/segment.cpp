@@ -52,24 +52,67 @@ bool inside(const ArmCylinder& arm, const Eigen::Vector3d& up, const Eigen::Vect
   return height > 0 && (from_tip - height * up).norm() < arm.radius;
 }
 
+// Whether a cluster stands still, all the time and away from the tip of the arm.
+bool is_background(const data::Points& points, const std::vector<int>& cluster, const ArmCylinder& arm,
+                   const std::set<StillCell>& still) {
+  constexpr double kFar = 0.15;  // from what the gripper holds [m]
+  std::size_t at_rest = 0;
+  double nearest = INFINITY;
+  for (const int row : cluster) {
+    const Eigen::Vector3d point = points.row(row).transpose();
+    at_rest += still.contains(still_cell(point)) ? 1 : 0;
+    nearest = std::min(nearest, (point - arm.tip).norm());
+  }
+  return 2 * at_rest >= cluster.size() && (arm.radius == 0 || nearest > kFar);
+}
+
+// What `settings` has, but at least three times what points are apart: those of a coarse camera far away
+// would have no neighbours.
+double cluster_gap(const Cloud::Ptr& cloud, const SegmentSettings& settings) {
+  constexpr std::size_t kAsked = 500;
+  constexpr double kTimes = 3;
+  if (cloud->size() < 2) return settings.cluster_gap;
+  pcl::search::KdTree<pcl::PointXYZ> tree;
+  tree.setInputCloud(cloud);
+  std::vector<float> squares;
+  pcl::Indices indices;
+  std::vector<float> found;
+  for (std::size_t i = 0; i < cloud->size(); i += 1 + cloud->size() / kAsked) {
+    tree.nearestKSearch(static_cast<int>(i), 2, indices, found);
+    squares.push_back(found.back());
+  }
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return std::max(settings.cluster_gap, kTimes * std::sqrt(static_cast<double>(*middle)));
+}
+
 // Rows of the clusters that are kept, largest first.
 std::vector<int> main_clusters(const data::Points& points, const std::vector<int>& rows,
-                               const SegmentSettings& settings) {
+                               const ArmCylinder& arm, const SegmentSettings& settings,
+                               const std::set<StillCell>& still) {
   if (rows.empty()) return {};
   const Cloud::Ptr cloud = to_pcl(points, rows, origin_of(points, rows));
   pcl::EuclideanClusterExtraction<pcl::PointXYZ> extraction;
   extraction.setInputCloud(cloud);
   extraction.setSearchMethod(std::make_shared<pcl::search::KdTree<pcl::PointXYZ>>());
-  extraction.setClusterTolerance(settings.cluster_gap);
+  extraction.setClusterTolerance(cluster_gap(cloud, settings));
   extraction.setMinClusterSize(settings.cluster_points);
   std::vector<pcl::PointIndices> clusters;
   extraction.extract(clusters);
+  std::vector<std::vector<int>> moving, background;
+  for (const pcl::PointIndices& found : clusters) {
+    std::vector<int> cluster;
+    for (const int index : found.indices) cluster.push_back(rows[index]);
+    (is_background(points, cluster, arm, still) ? background : moving).push_back(std::move(cluster));
+  }
+  // Without an arm, cloth that was never moved looks like background.
+  if (moving.empty() && arm.radius == 0) moving = std::move(background);
   std::size_t largest = 0;
-  for (const auto& cluster : clusters) largest = std::max(largest, cluster.indices.size());
+  for (const std::vector<int>& cluster : moving) largest = std::max(largest, cluster.size());
   std::vector<int> kept;
-  for (const auto& cluster : clusters)
-    if (cluster.indices.size() >= settings.cluster_share * largest)
-      for (int index : cluster.indices) kept.push_back(rows[index]);
+  for (const std::vector<int>& cluster : moving)
+    if (static_cast<double>(cluster.size()) >= settings.cluster_share * static_cast<double>(largest))
+      kept.insert(kept.end(), cluster.begin(), cluster.end());
   return kept;
 }
 
@@ -175,6 +218,12 @@ data::Points one_point_a_voxel(const data::Points& points, const std::vector<int
 
 }  // namespace
 
+StillCell still_cell(const Eigen::Vector3d& point) {
+  constexpr double kEdge = 0.05;  // [m]
+  const Eigen::Vector3d cell = (point / kEdge).array().floor();
+  return {std::llround(cell.x()), std::llround(cell.y()), std::llround(cell.z())};
+}
+
 const char* to_string(PointLabel label) {
   static constexpr std::array<const char*, point_label_count> names = {"outside", "table",   "arm",
                                                                        "clutter", "outlier", "cloth"};
@@ -227,7 +276,8 @@ FoundTable find_table(const std::vector<data::Points>& frames, const SegmentSett
 }
 
 Segmentation segment_cloth(const data::Points& points, const std::optional<TablePlane>& table,
-                           const ArmCylinder& arm, const SegmentSettings& settings) {
+                           const ArmCylinder& arm, const SegmentSettings& settings,
+                           const std::set<StillCell>& still) {
   Segmentation result;
   result.labels.assign(points.rows(), PointLabel::outside);
   std::vector<int> above;
@@ -241,7 +291,7 @@ Segmentation segment_cloth(const data::Points& points, const std::optional<Table
       above.push_back(row);
   }
   for (int row : above) result.labels[row] = PointLabel::clutter;
-  const std::vector<int> clusters = main_clusters(points, above, settings);
+  const std::vector<int> clusters = main_clusters(points, above, arm, settings, still);
   for (int row : clusters) result.labels[row] = PointLabel::outlier;
   const std::vector<int> cloth = without_outliers(points, clusters, settings);
   for (int row : cloth) result.labels[row] = PointLabel::cloth;

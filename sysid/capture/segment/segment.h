@@ -1,7 +1,9 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "data/mesh.h"
@@ -28,14 +30,19 @@ struct SegmentSettings {
   double plane_tilt = 0.2;                        ///< largest angle of its normal against `up` [rad]
   double plane_fraction = 0.05;                   ///< least share of the points that make a table
   double table_clearance = 0.008;                 ///< cloth is kept from this height above the table [m]
-  double cluster_gap = 0.015;                     ///< points closer than this belong together [m]
-  int cluster_points = 50;                        ///< smaller clusters are never the cloth
+  double cluster_gap =
+      0.015;  ///< points closer than this, or than three times their usual way, belong together [m]
+  int cluster_points = 50;      ///< smaller clusters are never the cloth
   double cluster_share = 0.2;   ///< clusters of at least this share of the largest are kept too
   int outlier_neighbours = 20;  ///< 0: no outlier filter
   double outlier_sigmas =
       2.5;               ///< drop where the mean distance to the neighbours exceeds mean + this many sigmas
   double voxel = 0.003;  ///< one point a cell of this edge [m]; 0: keep every point
 };
+
+/// A cube of 5 cm.
+using StillCell = std::array<std::int64_t, 3>;
+StillCell still_cell(const Eigen::Vector3d& point);
 
 enum class PointLabel { outside, table, arm, clutter, outlier, cloth };
 inline constexpr int point_label_count = 6;
@@ -62,8 +69,10 @@ FoundTable find_table(const std::vector<data::Points>& frames, const SegmentSett
 
 /// Cuts the cloth out of one frame: crop box, table (all that is not `table_clearance` above it, where there
 /// is one), arm, then Euclidean clusters, statistical outliers and a voxel grid. Points that are not finite
-/// count as outside.
+/// count as outside. A cluster half of whose points are in `still` cells is no cloth where it is far from the
+/// arm's tip; without an arm, where there is another cluster.
 Segmentation segment_cloth(const data::Points& points, const std::optional<TablePlane>& table,
-                           const ArmCylinder& arm, const SegmentSettings& settings);
+                           const ArmCylinder& arm, const SegmentSettings& settings,
+                           const std::set<StillCell>& still = {});
 
 }  // namespace flash::sysid

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -17,7 +18,9 @@
 #include "data/staged_folder.h"
 #include "data/text.h"
 #include "sysid/capture/clocks.h"
+#include "sysid/capture/segment/cell_check.h"
 #include "sysid/capture/segment/segment_picture.h"
+#include "sysid/capture/segmented_cell.h"
 
 namespace flash::sysid {
 namespace {
@@ -51,18 +54,92 @@ data::Points merged(const std::vector<RawView>& views, int frame, bool masked, s
   return points;
 }
 
-// The table does not move: one plane from some frames, thinned, serves all.
-FoundTable table_of(const std::vector<RawView>& views, int frames, const SegmentSettings& settings) {
+// Some frames, evenly over the recording, thinned.
+std::vector<CellFrame> sampled_frames(const std::vector<RawView>& views, const std::vector<double>& times,
+                                      const std::optional<data::Trajectory>& gripper) {
   constexpr int wanted_frames = 12, wanted_points = 10000;
+  const int frames = static_cast<int>(views.front().files.size());
   const int used = std::min(frames, wanted_frames);
-  std::vector<data::Points> sample;
+  std::vector<CellFrame> sample;
   std::size_t not_finite = 0;
   for (int k = 0; k < used; ++k) {
-    const data::Points points = merged(views, k * frames / used, false, not_finite);
+    const int frame = k * frames / used;
+    const data::Points points = merged(views, frame, false, not_finite);
     const Eigen::Index step = 1 + points.rows() / wanted_points;
-    sample.push_back(points(Eigen::seq(0, Eigen::last, step), Eigen::all));
+    sample.push_back({points(Eigen::seq(0, Eigen::last, step), Eigen::all), {}});
+    if (gripper) sample.back().tool = data::pose_at(*gripper, times[frame]).translation();
   }
+  return sample;
+}
+
+// The table does not move: one plane serves all frames.
+FoundTable table_of(const std::vector<CellFrame>& frames, const SegmentSettings& settings) {
+  std::vector<data::Points> sample;
+  for (const CellFrame& frame : frames) sample.push_back(frame.points);
   return find_table(sample, settings);
+}
+
+std::optional<FoundTable> table_as_asked(const std::vector<CellFrame>& frames,
+                                         const SegmentFolderSettings& settings) {
+  if (settings.table_height)
+    return FoundTable{{{0, 0, *settings.table_height}, settings.segment.up}, 0, 0, 0};
+  return settings.find_table ? std::optional(table_of(frames, settings.segment)) : std::nullopt;
+}
+
+std::vector<Eigen::Vector3d> places_of(const std::vector<RawView>& views) {
+  std::vector<Eigen::Vector3d> places;
+  for (const RawView& view : views)
+    if (view.camera) places.emplace_back(view.base_from_camera.translation());
+  return places;
+}
+
+std::string fault_of(const std::vector<RawView>& views, const std::vector<CellFrame>& frames,
+                     const std::optional<FoundTable>& table, const SegmentSettings& settings) {
+  return cell_fault(frames, table ? std::optional(table->plane) : std::nullopt, places_of(views), settings);
+}
+
+// Which usual mistake about the pose of the cameras would make a cell of it, for people to read; may be
+// empty.
+std::string suspected_pose(const std::vector<RawView>& views, const std::vector<double>& times,
+                           const SegmentFolderSettings& settings) {
+  using Pose = Eigen::Isometry3d;
+  const Pose opengl(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()));
+  const std::array<std::pair<const char*, std::function<Pose(const Pose&)>>, 3> mistakes = {
+      {{"the camera's axes are those of OpenGL (y up, z backwards), where x right, y down, z forwards is "
+        "expected",
+        [&](const Pose& pose) { return pose * opengl; }},
+       {"the pose is that of the base in the camera, where that of the camera in the base is expected",
+        [](const Pose& pose) { return pose.inverse(); }},
+       {"the pose is that of the base in a camera with axes of OpenGL",
+        [&](const Pose& pose) { return (opengl * pose).inverse(); }}}};
+  if (std::none_of(views.begin(), views.end(), [](const RawView& view) { return view.camera; })) return "";
+  for (const auto& [text, right] : mistakes) {
+    std::vector<RawView> other = views;
+    for (RawView& view : other)
+      if (view.camera) view.base_from_camera = right(view.base_from_camera);
+    try {
+      const std::vector<CellFrame> frames = sampled_frames(other, times, settings.gripper);
+      if (fault_of(other, frames, table_as_asked(frames, settings), settings.segment).empty())
+        return std::string(". It would be one if ") + text;
+    } catch (const data::InputError&) {  // no table there
+    }
+  }
+  return "";
+}
+
+void check_cell(const std::vector<RawView>& views, const std::vector<double>& times,
+                const std::vector<CellFrame>& frames, const SegmentFolderSettings& settings,
+                SegmentedFolder& result) {
+  const std::string fault = fault_of(views, frames, result.table, settings.segment);
+  if (fault.empty()) return;
+  const std::string text = views.front().folder +
+                           ": cameras, table and gripper are not of one cell: " + fault +
+                           suspected_pose(views, times, settings);
+  if (!settings.accept_fault)
+    throw data::InputError(text + ". Look at the camera's pose and at the frame and the tool of " +
+                           (settings.gripper ? settings.gripper_path : "the trajectory") +
+                           "; --force takes them as they are");
+  result.warnings.push_back(text);
 }
 
 std::string tilt_warning(const FoundTable& table) {
@@ -157,21 +234,30 @@ data::Points load_raw_frame(const RawView& view, int frame, bool masked, std::si
 
 SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vector<double>& times,
                                const SegmentFolderSettings& settings, const std::string& folder) {
-  const int frames = static_cast<int>(times.size());
+  const int frames = static_cast<int>(times.empty() ? views.front().files.size() : times.size());
   for (const RawView& view : views)
     if (static_cast<int>(view.files.size()) != frames)
       throw data::input_error(view.folder, "frames",
                               "found " + std::to_string(view.files.size()) + ", expected " +
                                   std::to_string(frames) + ": one a time stamp, the same in every view");
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::seconds kQuiet(2);  // between two lines of progress
+  Clock::time_point told = Clock::now();
+  const auto tell = [&](const std::string& text) {
+    if (!settings.told || Clock::now() - told < kQuiet) return;
+    told = Clock::now();
+    settings.told(text);
+  };
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what it has to say is said here
   SegmentedFolder result;
   if (settings.gripper) result.warnings = compare_clocks(times, *settings.gripper, settings.gripper_path);
   for (const RawView& view : views)
     result.warnings.insert(result.warnings.end(), view.warnings.begin(), view.warnings.end());
-  if (settings.table_height)
-    result.table = FoundTable{{{0, 0, *settings.table_height}, settings.segment.up}, 0, 0, 0};
-  else if (settings.find_table)
-    result.table = table_of(views, frames, settings.segment);
+  const std::vector<CellFrame> sample = sampled_frames(views, times, settings.gripper);
+  result.table = table_as_asked(sample, settings);
+  check_cell(views, times, sample, settings, result);
+  const auto plane = result.table ? std::optional(result.table->plane) : std::nullopt;
+  const std::set<StillCell> still = still_cells(sample, plane, settings.segment);
   constexpr double doubtful = 2 * M_PI / 180;
   if (result.table && result.table->tilt > doubtful) result.warnings.push_back(tilt_warning(*result.table));
 
@@ -182,9 +268,8 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
     ArmCylinder arm;
     arm.radius = settings.gripper ? settings.arm_radius : 0;
     if (settings.gripper) arm.tip = data::pose_at(*settings.gripper, times[k]).translation();
-    Segmentation segmentation =
-        segment_cloth(frame.points, result.table ? std::optional(result.table->plane) : std::nullopt, arm,
-                      settings.segment);
+    Segmentation segmentation = segment_cloth(frame.points, plane, arm, settings.segment, still);
+    tell("segmented " + std::to_string(k + 1) + " of " + std::to_string(frames) + " frames");
     with_cloth += segmentation.cloth.rows() > 0 ? 1 : 0;
     const int columns = std::min(frames, settings.picture_frames);
     const int next = static_cast<int>(shown.size());
@@ -208,6 +293,15 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
   }
   result.picture = "segment.png";
   data::save_png(draw_segmentation(shown), (fs::path(staged.path()) / result.picture).string());
+  SegmentedCell cell;
+  if (result.table) cell.table = {result.table->plane.point, result.table->plane.normal};
+  cell.times = times;
+  cell.cameras = places_of(views);
+  if (settings.gripper) {
+    cell.trajectory = (fs::path(staged.path()) / "gripper.tum").string();
+    data::save_tum(*settings.gripper, cell.trajectory);
+  }
+  save_segmented_cell(cell, (fs::path(staged.path()) / "segment.json").string());
   staged.publish(result.picture);
   return result;
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -55,14 +56,17 @@ struct SegmentFolderSettings {
   std::string gripper_path = "trajectory";  ///< its name in messages
   double arm_radius = 0.06;                 ///< of what is cut away [m]
   int picture_frames = 6;                   ///< shown, evenly spread over the recording
+  bool accept_fault = false;                ///< of the cell: say it, and go on
+  std::function<void(const std::string&)> told;  ///< progress, for people to read; may be empty
 };
 
-/// Cuts the cloth out of every frame, all views of one index merged, and writes `folder`/frames/NNNNNN.ply
-/// and segment.png: each column a frame, from the side above, from the top below; cloth red, table grey, arm
-/// blue, other clusters ochre, outliers violet. `times`: one a frame [s]; they count where there is a
-/// gripper. The table is sought in what masks hide as well. Throws InputError, and leaves nothing behind,
-/// where views differ in their number of frames, the gripper's clock is another one, no table is found, or no
-/// frame holds any cloth.
+/// Cuts the cloth out of every frame, all views of one index merged, and writes `folder`/frames/NNNNNN.ply,
+/// what it knows of the cell (segmented_cell.h), and segment.png: each column a frame, from the side above,
+/// from the top below; cloth red, table grey, arm blue, other clusters ochre, outliers violet. `times`: one a
+/// frame [s]; they count where there is a gripper, and may be empty without one. The table is sought in what
+/// masks hide as well. Throws InputError, and leaves nothing behind, where views differ in their number of
+/// frames, the gripper's clock is another one, no table is found, cameras, table and gripper are not of one
+/// cell (cell_check.h), or no frame holds any cloth.
 SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vector<double>& times,
                                const SegmentFolderSettings& settings, const std::string& folder);
 

@@ -16,8 +16,12 @@ TEST(Overlay, ComesBackFromItsFolder) {
   overlay.frames = {{0.5, mesh.vertices, data::Points::Constant(4, 3, 0.25), 0.002},
                     {0.7, mesh.vertices, data::Points(0, 3), 0}};
   save_overlay(overlay, folder / "lift");
+  EXPECT_EQ(load_overlay(folder / "lift").start_picture, "");
+  overlay.start_picture = "<svg/>";
+  save_overlay(overlay, folder / "lift");
   const Overlay loaded = load_overlay(folder / "lift");
   EXPECT_EQ(loaded.name, "lift");
+  EXPECT_EQ(loaded.start_picture, "<svg/>");
   EXPECT_EQ(loaded.triangles, overlay.triangles);
   ASSERT_EQ(loaded.frames.size(), 2u);
   EXPECT_EQ(loaded.frames[0].t, 0.5);

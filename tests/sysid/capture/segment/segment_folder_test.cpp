@@ -11,6 +11,7 @@
 #include "data/depth_image.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
+#include "sysid/capture/segmented_cell.h"
 
 namespace flash::sysid {
 namespace {
@@ -145,6 +146,83 @@ TEST_F(SegmentFolder, TheArmAboveTheGripperIsCutAway) {
   EXPECT_LT(segment_folder(views, {0.0}, settings, folder("out")).frames[0].cloth.col(2).maxCoeff(), 0.172);
   settings.gripper.reset();
   EXPECT_GT(segment_folder(views, {0.0}, settings, folder("out2")).frames[0].cloth.col(2).maxCoeff(), 0.3);
+}
+
+/// A gripper 1 cm above the patch of each frame.
+data::Trajectory above_patches(const std::vector<double>& heights) {
+  data::Trajectory gripper;
+  for (std::size_t k = 0; k < heights.size(); ++k) {
+    gripper.times.push_back(0.1 * static_cast<double>(k));
+    gripper.poses.emplace_back(Eigen::Translation3d(0.5, 0.1, 0.08 + heights[k]));
+  }
+  return gripper;
+}
+
+TEST_F(SegmentFolder, WhatIsKnownOfTheCellIsHandedOn) {
+  write_depth_view(folder("raw"), {0.1, 0.2});
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches({0.1, 0.2});
+  segment_folder({open_raw_view(folder("raw"))}, {0.0, 0.1}, settings, folder("out"));
+  const SegmentedCell cell = load_segmented_cell(folder("out") + "/segment.json");
+  ASSERT_TRUE(cell.table);
+  EXPECT_NEAR(height_under(*cell.table, camera_position), 0.07, 1e-6);
+  EXPECT_EQ(cell.times, (std::vector<double>{0, 0.1}));
+  ASSERT_EQ(cell.cameras.size(), 1u);
+  EXPECT_TRUE(cell.cameras[0].isApprox(camera_position));
+  EXPECT_TRUE(data::load_trajectory(cell.trajectory).poses[1].isApprox(settings.gripper->poses[1]));
+}
+
+TEST_F(SegmentFolder, CamerasAndGrippersOfOtherCellsAreRefusedAndTheMistakeIsNamed) {
+  write_depth_view(folder("raw"), {0.1, 0.2, 0.3});
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches({0.1, 0.2, 0.3});
+  const RawView view = open_raw_view(folder("raw"));
+  const std::vector<double> times = {0, 0.1, 0.2};
+  const auto message_with = [&](const RawView& other) {
+    return message_of([&] { segment_folder({other}, times, settings, folder("out")); });
+  };
+  EXPECT_EQ(message_with(view), "no error");
+
+  RawView opengl = view;
+  opengl.base_from_camera = view.base_from_camera * Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX());
+  EXPECT_NE(message_with(opengl).find(
+                "below the table that it sees. It would be one if the camera's axes are those "
+                "of OpenGL"),
+            std::string::npos)
+      << message_with(opengl);
+  RawView inverse = view;
+  inverse.base_from_camera = view.base_from_camera.inverse();
+  EXPECT_NE(message_with(inverse).find("the pose is that of the base in the camera"), std::string::npos)
+      << message_with(inverse);
+
+  for (Eigen::Isometry3d& pose : settings.gripper->poses) pose.translation().x() += 0.6;
+  EXPECT_NE(message_with(view).find("from the nearest point that is seen"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder("other")));
+  settings.accept_fault = true;
+  EXPECT_NE(segment_folder({view}, times, settings, folder("other")).warnings.at(0).find("not of one cell"),
+            std::string::npos);
+}
+
+TEST_F(SegmentFolder, AWallThatIsLargerThanTheClothIsNotTheCloth) {
+  const std::vector<double> heights = {0.1, 0.15, 0.2, 0.25, 0.3};
+  write_depth_view(folder("raw"), heights);
+  fs::create_directories(folder("wall"));
+  data::Points wall(120 * 60, 3);
+  for (int i = 0; i < wall.rows(); ++i) wall.row(i) << 0.2 + 0.005 * (i % 120), 0.5, 0.1 + 0.005 * (i / 120);
+  for (std::size_t k = 0; k < heights.size(); ++k)
+    data::save_point_cloud(wall, folder("wall") + "/" + std::to_string(k) + ".ply");
+  const std::vector<RawView> views = {open_raw_view(folder("raw")), open_raw_view(folder("wall"))};
+  const std::vector<double> times = {0, 0.1, 0.2, 0.3, 0.4};
+  SegmentFolderSettings settings;
+  for (const bool gripper : {false, true}) {
+    if (gripper) settings.gripper = above_patches(heights);
+    const SegmentedFolder result =
+        segment_folder(views, times, settings, folder(gripper ? "with" : "without"));
+    for (const Segmentation& frame : result.frames) {
+      ASSERT_GT(frame.cloth.rows(), 300) << gripper;
+      EXPECT_LT(frame.cloth.col(1).maxCoeff(), 0.25) << gripper;
+    }
+  }
 }
 
 TEST_F(SegmentFolder, NumbersInNamesCount) {

@@ -1,0 +1,119 @@
+#include "sysid/capture/import_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "data/text.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kRegistration = 0.15;  // from a gripper to the nearest point that is seen, at most [m]
+constexpr double kStretch = 0.05;       // by which calibrated cameras and robots are off at most [m]
+
+std::string metres(double length) { return data::format_short(std::round(1000 * length) / 1000) + " m"; }
+
+double quantile(std::vector<double> values, double share) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// A cloud about the tool that holds it.
+struct HeldCloud {
+  double nearest = 0, farthest = 0;                  ///< point, and all but 2 % of them [m]
+  double lowest = 0;                                 ///< over the table, all but 2 % of the points [m]
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();  ///< from where the tool started, seen from above [m]
+  double moved = 0;                                  ///< by the tool, seen from above [m]
+};
+
+std::vector<HeldCloud> held_clouds(const data::Recording& recording,
+                                   const std::vector<data::Keyframe>& keyframes) {
+  constexpr double kStray = 0.02;
+  const data::RecordedGrasp& grasp = recording.grasps.front();
+  const data::Trajectory& trajectory = recording.trajectories.at(grasp.gripper);
+  const Eigen::Vector3d start = trajectory.poses.front().translation();
+  std::vector<HeldCloud> held;
+  for (const data::Keyframe& keyframe : keyframes) {
+    if (keyframe.time < grasp.from || keyframe.cloud.rows() == 0) continue;
+    const Eigen::Vector3d tool = data::pose_at(trajectory, keyframe.time).translation();
+    std::vector<double> distances, heights;
+    for (const auto point : keyframe.cloud.rowwise()) {
+      distances.push_back((point.transpose() - tool).norm());
+      heights.push_back(point.z() - recording.table_point.z());
+    }
+    held.push_back({*std::min_element(distances.begin(), distances.end()), quantile(distances, 1 - kStray),
+                    quantile(heights, kStray),
+                    keyframe.cloud.leftCols<2>().colwise().mean().transpose() - start.head<2>(),
+                    (tool - start).head<2>().norm()});
+  }
+  return held;
+}
+
+}  // namespace
+
+std::vector<std::string> contradictions(const data::Recording& recording,
+                                        const std::vector<data::Keyframe>& keyframes) {
+  constexpr std::size_t kFewest = 3;  // frames
+  constexpr double kOffTable = 0.05;  // [m]
+  constexpr double kShare = 0.6;      // of its diagonal that hanging cloth reaches, folds and all
+  constexpr double kHighest = 0.06;   // of a tool that holds a lying sheet, over the table [m]
+  const std::vector<HeldCloud> held = held_clouds(recording, keyframes);
+  if (held.size() < kFewest) return {};
+  const Eigen::RowVector3d size =
+      recording.mesh.vertices.colwise().maxCoeff() - recording.mesh.vertices.colwise().minCoeff();
+  const double diagonal = size.norm(), offset = recording.nuisance.offset.norm();
+  const std::string sheet = metres(size.x()) + " x " + metres(size.y());
+
+  std::vector<std::string> found;
+  std::vector<double> nearest, farthest, off_table;
+  for (const HeldCloud& cloud : held) {
+    nearest.push_back(cloud.nearest);
+    farthest.push_back(cloud.farthest);
+    if (cloud.lowest > kOffTable) off_table.push_back(cloud.farthest);
+  }
+  if (const double gap = quantile(nearest, 0.5); gap > kRegistration + offset)
+    found.push_back("the gripper is " + metres(gap) +
+                    " from the nearest point of the cloth, in the median frame, expected at most " +
+                    metres(kRegistration + offset) +
+                    ": is the trajectory that of the tool centre point in the frame of the clouds?");
+  if (const double reach = quantile(farthest, 0.9); reach > diagonal + kStretch + offset)
+    found.push_back("the clouds reach " + metres(reach) + " from the gripper, and a sheet of " + sheet +
+                    " at most " + metres(diagonal) +
+                    ": is it larger than --mesh says, or is there something else in the clouds?");
+  if (off_table.size() >= kFewest)
+    if (const double reach = quantile(off_table, 1); reach + offset < kShare * diagonal)
+      found.push_back("the cloth ends " + metres(reach) +
+                      " from the gripper at most, above the table, and a sheet of " + sheet + " reaches " +
+                      metres(diagonal) + ": is it smaller than --mesh says, or cut off by a crop?");
+  if (!recording.grasps.front().select.corner) return found;
+
+  const data::Trajectory& trajectory = recording.trajectories.at(recording.grasps.front().gripper);
+  const Eigen::Vector3d start = trajectory.poses.front().translation();
+  const double height = start.z() - recording.table_point.z();
+  if (height > kHighest + recording.nuisance.offset.z())
+    found.push_back("the gripper starts " + metres(height) +
+                    " above the table on which the sheet lies in its fingers, expected at most " +
+                    metres(kHighest + recording.nuisance.offset.z()) +
+                    ": is the trajectory that of the flange, or does it begin before the grasp? (--table-z, "
+                    "where the table is not at " +
+                    metres(recording.table_point.z()) + ")");
+  const Eigen::RowVector3d low = recording.mesh.vertices.colwise().minCoeff();
+  const Eigen::Vector3d middle = recording.base_from_object * (low + 0.5 * size).transpose();
+  const Eigen::Vector2d stated = (middle - start).head<2>();
+  std::vector<double> along;
+  for (const HeldCloud& cloud : held)
+    if (cloud.moved < 0.25 * diagonal) along.push_back(stated.normalized().dot(cloud.middle));
+  if (along.size() >= kFewest)
+    if (const double way = quantile(along, 0.5); way < -(0.1 * diagonal + offset))
+      found.push_back(
+          "the clouds are " + metres(-way) +
+          " behind the gripper's start, seen along the sheet as --heading " +
+          data::format_short(std::round(std::atan2(stated.y(), stated.x()) * 180 / std::numbers::pi)) +
+          " has it: is it turned by half a turn?");
+  return found;
+}
+
+}  // namespace flash::sysid

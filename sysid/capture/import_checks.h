@@ -1,0 +1,21 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "data/recording.h"
+
+namespace flash::sysid {
+
+/// Where inputs of a recording contradict each other, for people to read, one line each. Cloth is a sheet: no
+/// point of it is farther from the gripper that holds it than the longest way across it.
+///
+/// - the gripper is far from the cloth in most frames, or the cloud reaches farther than the sheet does;
+/// - the gripper starts far above the table, though the sheet lies there in its fingers (grasps of corners);
+/// - the sheet is stated to lie on the other side of the gripper than the clouds do (grasps of corners);
+/// - the cloth never reaches far enough from the gripper for its stated size, though it ends above the table.
+///
+/// What registration may be off, 5 to 15 cm and the bounds on the camera's offset, is allowed for.
+std::vector<std::string> contradictions(const data::Recording& recording,
+                                        const std::vector<data::Keyframe>& keyframes);
+
+}  // namespace flash::sysid
