@@ -52,17 +52,6 @@ data::Geometry load(const MeshOptions& options, std::size_t& left_out) {
   return scan;
 }
 
-bool same_file(const std::string& a, const std::string& b) {
-  namespace fs = std::filesystem;
-  return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
-}
-
-/// --force does not write over the scan.
-void check_spared(const MeshOptions& options, const std::string& path, const char* option) {
-  if (same_file(path, options.input))
-    throw data::InputError(std::string(option) + ": found the name of the scan, expected another file");
-}
-
 /// A sheet whose triangles lie on each other has no rest shape.
 void check_turned_over(const MeshOptions& options, const data::FlatShape& flat, Eigen::Index triangles) {
   if (flat.inverted == 0 || options.force) return;
@@ -212,16 +201,12 @@ int mesh(const MeshOptions& options) {
   if (options.frames.intrinsics.empty() && !(options.frames.poses + options.frames.extrinsics).empty())
     throw data::InputError("--poses and --extrinsics: are for depth frames, which need --intrinsics");
   data::check_file_free(options.out, options.force);
-  check_spared(options, options.out, "--out");
   if (options.tets) {
     data::format_tet_mesh({}, options.out);  // refuses the ending before the work
     return mesh_solid(options);
   }
   data::format_triangle_mesh({}, options.out);
   if (!options.flat.empty()) {
-    if (same_file(options.flat, options.out))
-      throw data::InputError("--flat: found the name of --out, expected another file");
-    check_spared(options, options.flat, "--flat");
     data::check_file_free(options.flat, options.force);
     data::format_triangle_mesh({}, options.flat);
   }

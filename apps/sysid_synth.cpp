@@ -95,6 +95,25 @@ std::string name_of_folder(const std::string& folder) {
   return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
+// Throws InputError where the truth would take the place of a file of the recording.
+void check_truth_name(const SynthOptions& options) {
+  const fs::path name = fs::weakly_canonical(fs::absolute(options.truth))
+                            .lexically_relative(fs::weakly_canonical(fs::absolute(options.out)));
+  const bool within = !name.empty() && *name.begin() != "..";
+  const bool of_recording = name.has_parent_path() || name.extension() == ".tum" ||
+                            name == "recording.json" || name == "camera_info.yaml" || name == "tracks.csv" ||
+                            name == "placed.csv";
+  if (within && of_recording)
+    throw data::InputError("--truth-out: found " + options.truth +
+                           ", the name of a file of the recording, expected another, as truth.json");
+}
+
+void check_places(const SynthOptions& options) {
+  if (!options.truth.empty()) check_truth_name(options);
+  data::check_folder_free(options.out, options.common.force);
+  if (!options.truth.empty()) data::check_file_free(options.truth, options.common.force);
+}
+
 // The recording of a solid again, with the marker tracks that the asset gives it.
 int run_twin(const SynthOptions& options) {
   const data::Recording recording = data::load_recording(options.like);
@@ -115,7 +134,7 @@ int run_twin(const SynthOptions& options) {
   sysid::check_axes(axes, base);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
-  data::check_folder_free(options.out, options.common.force);
+  check_places(options);
   for (const std::string& notice : notices) say(options.common, notice);
 
   const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
@@ -159,8 +178,7 @@ int run_synth(SynthOptions options) {
   const sysid::MaterialBase base = material_base(asset, sim::make_sheet(mesh), notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
-  data::check_folder_free(options.out, options.common.force);
-  if (!options.truth.empty()) data::check_file_free(options.truth, options.common.force);
+  check_places(options);
   for (const std::string& notice : notices) say(options.common, notice);
 
   sysid::SynthSettings& settings = options.synth;
