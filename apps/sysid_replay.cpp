@@ -139,6 +139,7 @@ nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const s
 int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   stop_on_signals();
   const data::Recording recording = data::load_recording(options.recording);
+  warn_of_doubts(recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
   check_kind(asset, recording);
   check_options(options.replay, asset);

@@ -117,6 +117,7 @@ void check_places(const SynthOptions& options) {
 // The recording of a solid again, with the marker tracks that the asset gives it.
 int run_twin(const SynthOptions& options) {
   const data::Recording recording = data::load_recording(options.like);
+  warn_of_doubts(recording);
   const data::Asset asset = data::load_asset(options.asset);
   if (!recording.is_solid())
     throw data::InputError("--like: found a sheet in " + recording.source +
