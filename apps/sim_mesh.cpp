@@ -13,6 +13,7 @@
 #include "apps/sim_verbs.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/meshing/flatten.h"
 #include "data/meshing/fused_frames.h"
@@ -158,7 +159,7 @@ int mesh_sheet(const MeshOptions& options) {
   data::write_together(files);
   for (const std::string& warning : warnings) std::cerr << "flash-sim: warning: " << warning << '\n';
   if (options.json)
-    std::cout << json_of(options, sheet, flat, warnings, exit_code).dump(2) << '\n';
+    std::cout << data::format_json(json_of(options, sheet, flat, warnings, exit_code));
   else
     print(options, sheet, flat);
   return exit_code;
@@ -182,7 +183,7 @@ int mesh_solid(const MeshOptions& options) {
                                          {"angle_min_deg", solid.least_angle},
                                          {"angle_max_deg", solid.largest_angle},
                                          {"exit_code", exit_done}};
-    std::cout << json.dump(2) << '\n';
+    std::cout << data::format_json(json);
     return exit_done;
   }
   std::printf("%s: %s vertices, %s tetrahedra; edges %s to %s; faces meet at %s to %s degrees\n",
