@@ -11,6 +11,7 @@
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
@@ -109,7 +110,9 @@ void check_truth_name(const SynthOptions& options) {
 }
 
 void check_places(const SynthOptions& options) {
+  expect_each_once("--camera", options.cameras);
   if (!options.truth.empty()) check_truth_name(options);
+  expect_ending("--truth-out", options.truth, {".json"});
   data::check_folder_free(options.out, options.common.force);
   if (!options.truth.empty()) data::check_file_free(options.truth, options.common.force);
 }
@@ -150,15 +153,13 @@ int run_twin(const SynthOptions& options) {
       options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
   data::write_atomically(truth, sysid::truth_text(candidate, options.marker_noise, options.common.seed));
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
-                                        {"recording", options.out},
-                                        {"truth", truth},
-                                        {"keyframes", tracks.samples.size()},
-                                        {"points", 0},
-                                        {"unconverged_share", result.unconverged_share},
-                                        {"residual_max", result.residual_max}}
-                     .dump(2)
-              << '\n';
+    std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
+                                                          {"recording", options.out},
+                                                          {"truth", truth},
+                                                          {"keyframes", tracks.samples.size()},
+                                                          {"points", 0},
+                                                          {"unconverged_share", result.unconverged_share},
+                                                          {"residual_max", result.residual_max}});
   } else {
     std::printf("%s: %zu times of %zu markers\n%s\n", options.out.c_str(), tracks.samples.size(),
                 tracks.names.size(), truth.c_str());
@@ -215,15 +216,13 @@ int run_synth(SynthOptions options) {
   Eigen::Index points = 0;
   for (const data::Points& cloud : synthetic.clouds) points += cloud.rows();
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
-                                        {"recording", options.out},
-                                        {"truth", truth},
-                                        {"keyframes", synthetic.clouds.size()},
-                                        {"points", points},
-                                        {"unconverged_share", synthetic.unconverged_share},
-                                        {"residual_max", synthetic.residual_max}}
-                     .dump(2)
-              << '\n';
+    std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
+                                                          {"recording", options.out},
+                                                          {"truth", truth},
+                                                          {"keyframes", synthetic.clouds.size()},
+                                                          {"points", points},
+                                                          {"unconverged_share", synthetic.unconverged_share},
+                                                          {"residual_max", synthetic.residual_max}});
   } else {
     std::printf("%s: %zu keyframes, %s points\n%s\n", options.out.c_str(), synthetic.clouds.size(),
                 data::format_count(static_cast<std::size_t>(points)).c_str(), truth.c_str());
