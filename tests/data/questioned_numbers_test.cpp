@@ -27,7 +27,7 @@ TEST(QuestionedNumbers, OfOtherUnitsAreOneNotice) {
         text += notice.substr(notice.find("? ") + 2);
     return text;
   };
-  EXPECT_EQ(question({}), "");
+  EXPECT_EQ(question(json::object()), "");
   EXPECT_EQ(question({{"areal_density", 150}}),
             "areal density found 150 kg/m^2, usually 0.005 to 20 (150 g/m^2 are 0.15)");
   EXPECT_EQ(
