@@ -182,6 +182,7 @@ std::vector<Recording> recordings_of_arms(const std::vector<std::string>& arms,
 
 std::vector<Recording> recordings_of_cameras(const RegisterOptions& options) {
   std::vector<Recording> recordings;
+  expect_each_once("--cameras", options.cameras);
   const std::vector<std::string> names = names_of(options.cameras);
   for (std::size_t i = 0; i < names.size(); ++i) {
     DatasetChoice choice;
@@ -216,6 +217,7 @@ calib::Cell solved_cell(std::vector<Recording> recordings, const RegisterOptions
 }
 
 calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
+  expect_each_once("calibrations", options.calibrations);
   const std::vector<std::string> arms = names_of(options.calibrations);
   const std::vector<calib::Extrinsics> calibrations = load_calibrations(options, doubts);
   const calib::Cell composed = calib::compose_cell(arms, calibrations);

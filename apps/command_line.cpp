@@ -26,6 +26,7 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/message_line.h"
+#include "data/text.h"
 
 namespace flash {
 namespace {
@@ -121,20 +122,69 @@ int delivered(const std::string& name, int code) {
                 exit_failed);
 }
 
-/// CLI11 would only say that a verb is missing.
-void check_verb(const CLI::App& app, int argc, char** argv) {
-  std::vector<std::string> verbs;
-  for (const CLI::App* verb : app.get_subcommands(nullptr)) verbs.push_back(verb->get_name());
-  if (argc < 2 || argv[1][0] == '-' || std::find(verbs.begin(), verbs.end(), argv[1]) != verbs.end()) return;
-  const std::string nearest = data::nearest_name(argv[1], verbs);
-  throw data::InputError(std::string(argv[1]) + ": unknown verb" +
-                         (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)"));
-}
-
 void collect_options(const CLI::App& app, std::vector<std::string>& names) {
   for (const CLI::Option* option : app.get_options())
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
   for (const CLI::App* group : app.get_subcommands(nullptr)) collect_options(*group, names);
+}
+
+/// Two names are near by their letters, not by the strokes before them.
+std::string nearest_option(const std::string& word, const std::vector<std::string>& known) {
+  std::vector<std::string> names;
+  for (const std::string& name : known) names.push_back(name.substr(2));
+  const std::string nearest = data::nearest_name(word.substr(2), names);
+  return nearest.empty() ? "" : "--" + nearest;
+}
+
+std::string meant(const std::string& nearest) {
+  return nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)";
+}
+
+/// CLI11 would only say that a verb is missing: of a verb that there is none of, and of an option before it.
+void check_verb(const CLI::App& app, int argc, char** argv) {
+  std::vector<std::string> verbs, known, of_verbs;
+  for (const CLI::App* verb : app.get_subcommands(nullptr)) {
+    verbs.push_back(verb->get_name());
+    collect_options(*verb, of_verbs);
+  }
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  for (int i = 1; i < argc; ++i) {
+    const std::string word(argv[i], std::strcspn(argv[i], "="));
+    if (word.starts_with("--") && word.size() > 2) {
+      if (word == "--config" && argv[i] == word) ++i;  // its file
+      if (std::find(known.begin(), known.end(), word) != known.end()) continue;
+      if (std::find(of_verbs.begin(), of_verbs.end(), word) != of_verbs.end())
+        throw data::InputError(word + ": found before the verb, expected after it, as " + app.get_name() +
+                               " VERB " + word);
+      throw data::InputError(word + ": unknown option" + meant(nearest_option(word, known)));
+    }
+    if (word.empty() || word.front() == '-' || std::find(verbs.begin(), verbs.end(), word) != verbs.end())
+      return;
+    throw data::InputError(word + ": unknown verb" + meant(data::nearest_name(word, verbs)));
+  }
+}
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+/// CLI11 passes over lines of one or two letters without a word.
+void check_short_lines(const std::string& path, const std::string& text) {
+  data::LineReader lines(text);
+  std::string_view line;
+  bool in_list = false;  // of several lines
+  while (lines.next(line)) {
+    const std::string_view word = trimmed(line);
+    const std::size_t equals = word.find('=');
+    if (!in_list && word.size() < 3 && !word.empty() && word.front() != '#' && word.front() != ';')
+      throw data::InputError(path + ":" + std::to_string(lines.number()) + ": found \"" + std::string(word) +
+                             "\", expected TOML, as [grid] and envs=8");
+    if (equals != std::string_view::npos) in_list = trimmed(word.substr(equals + 1)).starts_with('[');
+    if (word.ends_with(']')) in_list = false;
+  }
 }
 
 /// CLI11 would wait for a pipe, read a device without end, and take bytes that are no text for flags.
@@ -146,6 +196,7 @@ std::string check_config(const std::string& path) {
   if (odd != text.end())
     throw data::InputError(path + ":" + std::to_string(1 + std::count(text.begin(), odd, '\n')) +
                            ": found a control character, expected TOML, as [grid] and envs=8");
+  check_short_lines(path, text);
   return {};
 }
 
@@ -190,14 +241,6 @@ std::string present_name(const std::string& word, const std::vector<std::string>
   return "";
 }
 
-/// Two names are near by their letters, not by the strokes before them.
-std::string nearest_option(const std::string& word, const std::vector<std::string>& known) {
-  std::vector<std::string> names;
-  for (const std::string& name : known) names.push_back(name.substr(2));
-  const std::string nearest = data::nearest_name(word.substr(2), names);
-  return nearest.empty() ? "" : "--" + nearest;
-}
-
 /// The first word of the command line that nothing takes.
 std::string word_too_many(const CLI::App& app) {
   const std::vector<std::string> words = app.remaining(true);
@@ -228,8 +271,7 @@ std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int a
              argv[1];
     const std::string present = present_name(word, known);
     const std::string nearest = present.empty() ? nearest_option(word, known) : present;
-    return word + ": unknown option" +
-           (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)");
+    return word + ": unknown option" + meant(nearest);
   }
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr)
     if (const std::string word = word_too_many(app); !word.empty())

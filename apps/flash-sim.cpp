@@ -2,6 +2,7 @@
 
 #include "apps/command_line.h"
 #include "apps/sim_verbs.h"
+#include "apps/spared_inputs.h"
 #include "sim/cpu/instruction_level.h"
 
 int main(int argc, char** argv) {
@@ -24,5 +25,8 @@ int main(int argc, char** argv) {
   flash::add_bench_verb(app, action);
   flash::add_mesh_verb(app, action);
   flash::add_picture_verb(app, action);
-  return flash::run_tool(app, argc, argv, [&] { return action(); });
+  return flash::run_tool(app, argc, argv, [&] {
+    flash::expect_spared_inputs(app);
+    return action();
+  });
 }

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 
 #include "apps/command_line.h"
+#include "apps/spared_inputs.h"
 #include "apps/sysid_verbs.h"
 
 int main(int argc, char** argv) {
@@ -28,5 +29,8 @@ int main(int argc, char** argv) {
   flash::add_segment_verb(app, action);
   flash::add_export_verb(app, action);
   flash::add_report_verb(app, action);
-  return flash::run_tool(app, argc, argv, [&] { return action(); });
+  return flash::run_tool(app, argc, argv, [&] {
+    flash::expect_spared_inputs(app);
+    return action();
+  });
 }

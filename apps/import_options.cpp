@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string_view>
 #include <vector>
 
@@ -145,7 +146,13 @@ data::Selection parse_grasp(const std::string& text) {
     for (const std::string_view word : data::split(std::string_view(text).substr(colon + 1), ",")) {
       const std::optional<long> index = data::parse_integer(word);
       if (!index || *index < 0) throw option_error("grasp", text, "whole numbers from 0 after the colon");
-      indices.push_back(data::to_index(static_cast<double>(*index)));
+      if (*index > std::numeric_limits<int>::max())
+        throw option_error("grasp", text,
+                           "numbers of vertices of the mesh, none above " +
+                               data::format_count(std::numeric_limits<int>::max()));
+      if (kind == "vertices" && std::find(indices.begin(), indices.end(), *index) != indices.end())
+        throw option_error("grasp", text, "each vertex once");
+      indices.push_back(static_cast<int>(*index));
     }
   if (kind == "corner" && (indices.empty() || (indices.size() == 2 && indices[0] <= 1 && indices[1] <= 1))) {
     grasp.corner = indices.empty() ? std::array<int, 2>{0, 0} : std::array<int, 2>{indices[0], indices[1]};

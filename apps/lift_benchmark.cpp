@@ -115,6 +115,14 @@ int environments_together(const LiftBenchmark& benchmark) {
   return benchmark.alone ? 1 : benchmark.environments;
 }
 
+double least_seconds(const LiftBenchmark& benchmark) {
+  constexpr double kWorkPerSecond = 1e6;  // steps of a vertex on one thread; 3e5 were measured
+  if (benchmark.device == Device::cuda) return 0;
+  const double vertices = std::pow(cells_of(benchmark) + 1.0, 2);
+  return vertices * benchmark.environments * benchmark.steps /
+         (kWorkPerSecond * std::max(1, std::min(benchmark.threads, benchmark.environments)));
+}
+
 void check(const LiftBenchmark& benchmark, double memory_limit) {
   const auto increasing = [](const char* option, double low, double high) {
     if (!(low <= high))
@@ -134,8 +142,16 @@ void check(const LiftBenchmark& benchmark, double memory_limit) {
   const double of_vertices =
       vertices * (at_work * solver_bytes_per_vertex + at_once * batch_bytes_per_vertex);
   const double of_steps = batch_bytes_per_step * benchmark.steps * at_once;
-  if (memory_limit <= 0 || of_vertices + of_steps <= memory_limit) return;
   const auto count = [](double number) { return data::format_count(static_cast<std::size_t>(number)); };
+  if (memory_limit <= 0 || of_vertices + of_steps <= memory_limit) {
+    constexpr double kDay = 86400;
+    if (const double seconds = least_seconds(benchmark); seconds > kDay)
+      throw data::InputError("--envs: " + count(benchmark.environments) + " environments of " +
+                             count(benchmark.steps) + " steps of " + count(vertices) +
+                             " vertices take more than " + data::format_short(seconds / kDay) +
+                             " days on the CPU, expected at most one: use fewer");
+    return;
+  }
   throw data::InputError(
       (of_vertices > of_steps ? "--vertices: " + count(vertices) : "--steps: " + count(benchmark.steps)) +
       " of " + count(at_once) + " environments at once on " + count(at_work) + " threads take about " +

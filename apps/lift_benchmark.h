@@ -61,9 +61,12 @@ struct LiftBenchmarkResult {
 /// Environments that are simulated together.
 int environments_together(const LiftBenchmark& benchmark);
 
+/// What it takes on the CPU at least, however fast that is [s]; 0: of a device nothing is known.
+double least_seconds(const LiftBenchmark& benchmark);
+
 /// Throws data::InputError where a range ends below its start, where the solvers at work and what is kept of
 /// the environments that run at once need more than `memory_limit` [bytes] (0: unknown), or where a device is
-/// to take more vertices than any can.
+/// to take more vertices than any can; and where the CPU takes longer than a day.
 void check(const LiftBenchmark& benchmark, double memory_limit = data::memory_limit());
 
 /// Throws as check() does; data::Stopped within a step after `stop` is set.

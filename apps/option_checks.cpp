@@ -1,6 +1,9 @@
 #include "apps/option_checks.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 
 #include "data/error.h"
 #include "data/scene.h"
@@ -110,6 +113,7 @@ CLI::Option* add_list_option(CLI::App& verb, const std::string& name, std::vecto
             if (count > 0 && values.size() != count)
               throw data::InputError(name + ": found " + std::to_string(values.size()) + ", expected " +
                                      std::to_string(count) + " with a comma between them");
+            expect_each_once(name, values);
           },
           meaning)
       ->check(of_each(check));
@@ -120,14 +124,40 @@ CLI::Option* add_list_option(CLI::App& verb, const std::string& name, std::vecto
   return verb
       .add_option_function<std::vector<std::string>>(
           name,
-          [&values](const std::vector<std::string>& texts) {
+          [name, &values](const std::vector<std::string>& texts) {
             values.clear();
-            for (const std::string& item : items_of(texts))
+            for (const std::string& item : items_of(texts)) {
               values.push_back(static_cast<int>(data::parse_integer(item).value()));
+              if (std::find(values.begin(), values.end() - 1, values.back()) != values.end() - 1)
+                throw data::InputError(name + ": found " + item + " twice, expected each once");
+            }
           },
           meaning)
       ->type_name("INT")
       ->check(of_each(check));
+}
+
+void expect_each_once(const std::string& name, const std::vector<std::string>& words) {
+  namespace fs = std::filesystem;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      std::error_code error;
+      if (words[i] == words[j])
+        throw data::InputError(name + ": found " + words[i] + " twice, expected each once");
+      if (fs::exists(words[i], error) && fs::exists(words[j], error) &&
+          fs::equivalent(words[i], words[j], error))
+        throw data::InputError(name + ": found " + words[j] + " and " + words[i] +
+                               ", which are the same, expected each once");
+    }
+}
+
+void expect_ending(const std::string& name, const std::string& file,
+                   const std::vector<std::string>& endings) {
+  const std::string ending = data::lower_extension(file);
+  if (ending.empty() || std::find(endings.begin(), endings.end(), ending) != endings.end()) return;
+  std::string expected;
+  for (const std::string& each : endings) expected += (expected.empty() ? "" : " or ") + each;
+  throw data::InputError(name + ": found \"" + file + "\", expected a name that ends in " + expected);
 }
 
 CLI::Validator thread_number() { return whole_number(0, 1024); }

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -12,6 +13,8 @@
 #include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
 #include "data/error.h"
+#include "data/json_reader.h"
+#include "data/text.h"
 
 namespace flash {
 namespace {
@@ -140,6 +143,12 @@ int bench(BenchOptions options) {
       sim::check(benchmark);
       benchmarks.push_back(benchmark);
     }
+  double seconds = 0;
+  for (const sim::LiftBenchmark& each : benchmarks) seconds += sim::least_seconds(each);
+  if (seconds > 60)
+    std::fprintf(stderr, "this takes at least %s\n",
+                 seconds < 7200 ? (data::format_short(std::ceil(seconds / 60)) + " min").c_str()
+                                : (data::format_short(seconds / 3600) + " h").c_str());
   sim::DeviceRates rates;
   if (on_device)
     rates = sim::device_rates(benchmark.cuda_devices.empty() ? 0 : benchmark.cuda_devices.front());
@@ -163,7 +172,7 @@ int bench(BenchOptions options) {
     else
       print_cpu(run);
   }
-  if (options.json) std::cout << json.dump(2) << '\n';
+  if (options.json) std::cout << data::format_json(json);
   return exit_done;
 }
 

@@ -13,6 +13,7 @@
 #include "apps/sim_verbs.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/meshing/flatten.h"
 #include "data/meshing/fused_frames.h"
@@ -50,17 +51,6 @@ data::Geometry load(const MeshOptions& options, std::size_t& left_out) {
   scan.points *= options.scale;
   if (options.points) scan.triangles.resize(0, 3);
   return scan;
-}
-
-bool same_file(const std::string& a, const std::string& b) {
-  namespace fs = std::filesystem;
-  return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
-}
-
-/// --force does not write over the scan.
-void check_spared(const MeshOptions& options, const std::string& path, const char* option) {
-  if (same_file(path, options.input))
-    throw data::InputError(std::string(option) + ": found the name of the scan, expected another file");
 }
 
 /// A sheet whose triangles lie on each other has no rest shape.
@@ -169,7 +159,7 @@ int mesh_sheet(const MeshOptions& options) {
   data::write_together(files);
   for (const std::string& warning : warnings) std::cerr << "flash-sim: warning: " << warning << '\n';
   if (options.json)
-    std::cout << json_of(options, sheet, flat, warnings, exit_code).dump(2) << '\n';
+    std::cout << data::format_json(json_of(options, sheet, flat, warnings, exit_code));
   else
     print(options, sheet, flat);
   return exit_code;
@@ -193,7 +183,7 @@ int mesh_solid(const MeshOptions& options) {
                                          {"angle_min_deg", solid.least_angle},
                                          {"angle_max_deg", solid.largest_angle},
                                          {"exit_code", exit_done}};
-    std::cout << json.dump(2) << '\n';
+    std::cout << data::format_json(json);
     return exit_done;
   }
   std::printf("%s: %s vertices, %s tetrahedra; edges %s to %s; faces meet at %s to %s degrees\n",
@@ -212,16 +202,12 @@ int mesh(const MeshOptions& options) {
   if (options.frames.intrinsics.empty() && !(options.frames.poses + options.frames.extrinsics).empty())
     throw data::InputError("--poses and --extrinsics: are for depth frames, which need --intrinsics");
   data::check_file_free(options.out, options.force);
-  check_spared(options, options.out, "--out");
   if (options.tets) {
     data::format_tet_mesh({}, options.out);  // refuses the ending before the work
     return mesh_solid(options);
   }
   data::format_triangle_mesh({}, options.out);
   if (!options.flat.empty()) {
-    if (same_file(options.flat, options.out))
-      throw data::InputError("--flat: found the name of --out, expected another file");
-    check_spared(options, options.flat, "--flat");
     data::check_file_free(options.flat, options.force);
     data::format_triangle_mesh({}, options.flat);
   }

@@ -7,6 +7,7 @@
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
+#include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/mesh_picture.h"
 #include "data/text.h"
@@ -26,6 +27,10 @@ int picture(const PictureOptions& options) {
   // The first stands out: it is what moves.
   static constexpr data::Colour colours[] = {
       {214, 62, 52}, {176, 168, 158}, {120, 140, 160}, {200, 190, 140}};
+  expect_ending("--out", options.out, {".png"});
+  if (data::lower_extension(options.out).empty())
+    throw data::InputError("--out: found \"" + options.out + "\", expected a name that ends in .png");
+  expect_each_once("meshes", options.meshes);
   data::check_file_free(options.out, options.force);
   std::vector<data::PicturedMesh> pictured;
   for (const std::string& path : options.meshes) {

@@ -20,6 +20,7 @@
 #include "apps/sim_verbs.h"
 #include "data/error.h"
 #include "data/folder_lock.h"
+#include "data/json_reader.h"
 #include "data/message_line.h"
 #include "data/scene.h"
 #include "data/text.h"
@@ -100,7 +101,7 @@ void print_json(const sim::SceneSummary& summary, const std::string& out, int ex
     json["layer_distance_min_m"] = summary.layer_distance_min;
     json["layer_touches_max"] = summary.layer_touches_max;
   }
-  std::cout << json.dump(2) << '\n';
+  std::cout << data::format_json(json);
 }
 
 int steps_to_run(const RunOptions& options, const data::Scene& scene) {

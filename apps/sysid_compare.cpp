@@ -1,13 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
@@ -54,11 +53,9 @@ void print_comparison(const std::vector<sysid::FinishedSearch>& searches,
 }
 
 int run_compare(const CompareOptions& options) {
+  expect_ending("--out", options.out, {".json"});
+  expect_each_once("runs", options.runs);
   std::vector<sysid::FinishedSearch> searches;
-  std::set<std::filesystem::path> folders;
-  for (const std::string& run : options.runs)
-    if (!folders.insert(std::filesystem::weakly_canonical(run)).second)
-      throw data::InputError(run + ": named twice, expected searches that differ");
   for (const std::string& run : options.runs) searches.push_back(sysid::load_finished_search(run));
   const std::vector<sysid::ComparedSearch> compared = sysid::compare(searches);
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);

@@ -4,9 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
@@ -29,6 +31,7 @@ struct ExportOptions {
 };
 
 int run_export(const ExportOptions& options) {
+  expect_ending("--out", options.out, {".json"});
   const sysid::Summary summary = sysid::load_search_folder(options.run).summary;
   const data::Asset base = data::load_asset(options.asset.empty() ? summary.asset : options.asset);
   data::check_file_free(options.out, options.common.force);
@@ -53,13 +56,11 @@ int run_export(const ExportOptions& options) {
   for (const std::string& caveat : sysid::caveats(summary)) warn(caveat);
   if (summary.exit_code != 0) warn("the search behind this asset ended with: " + summary.warnings.front());
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-export/1"},
-                                        {"asset", options.out},
-                                        {"not_expressed", notices},
-                                        {"caveats", sysid::caveats(summary)},
-                                        {"exit_code", summary.exit_code}}
-                     .dump(2)
-              << '\n';
+    std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-export/1"},
+                                                          {"asset", options.out},
+                                                          {"not_expressed", notices},
+                                                          {"caveats", sysid::caveats(summary)},
+                                                          {"exit_code", summary.exit_code}});
   } else {
     std::printf("%s\n", options.out.c_str());
   }

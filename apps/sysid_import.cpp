@@ -11,6 +11,7 @@
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/text.h"
 #include "sysid/capture/import.h"
 #include "sysid/capture/import_tracks.h"
@@ -64,13 +65,12 @@ Eigen::Vector3d parse_gravity(const std::string& text) {
 int tell_import(const data::Recording& recording, const std::string& out, const CommonOptions& options) {
   const std::string path = (fs::path(out) / "recording.json").string();
   for (const std::string& notice : recording.notices) say(options, notice);
+  warn_of_doubts(recording);
   if (options.json) {
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-import/1"},
-                                        {"recording", path},
-                                        {"keyframes", recording.keyframes.size()},
-                                        {"notices", recording.notices}}
-                     .dump(2)
-              << '\n';
+    std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-import/1"},
+                                                          {"recording", path},
+                                                          {"keyframes", recording.keyframes.size()},
+                                                          {"notices", recording.notices}});
   } else {
     std::printf("%s: %zu keyframes\n", path.c_str(), recording.keyframes.size());
   }

@@ -288,6 +288,10 @@ void warn(const std::string& line) {
   std::cerr << "flash-sysid: warning: " << data::message_line(line) << '\n';
 }
 
+void warn_of_doubts(const data::Recording& recording) {
+  for (const std::string& doubt : recording.doubts) warn(recording.source + ": " + doubt);
+}
+
 void warn_of_camera(const data::Recording& recording) {
   if (!recording.camera) return;
   for (const std::string& warning : recording.camera->warnings)
@@ -354,6 +358,7 @@ std::vector<data::Recording> load_recordings(const std::vector<std::string>& pat
   for (const std::string& path : paths) {
     recordings.push_back(data::load_recording(path));
     const data::Recording& recording = recordings.back();
+    warn_of_doubts(recording);
     names.push_back(recording.name);
     if (paths.size() == 1) break;
     const auto [same, is_new] = known.emplace(data::observed_sha256(recording), recording.source);

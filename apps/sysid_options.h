@@ -72,6 +72,9 @@ sysid::Axis parse_searched(const std::string& name, const std::string& specifica
 void say(const CommonOptions& options, const std::string& line);
 void warn(const std::string& line);
 
+/// What is likely wrong with the recording itself.
+void warn_of_doubts(const data::Recording& recording);
+
 /// What is known to be wrong with the calibration behind the recording's camera.
 void warn_of_camera(const data::Recording& recording);
 

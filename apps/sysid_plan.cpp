@@ -32,6 +32,7 @@ struct PlanOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::vector<std::pair<std::string, std::string>> axes;
+  std::vector<std::string> holds;
   std::string run;  // of a search: what it left to be known
   double error = 1e-3;
   double keyframes = 10;
@@ -39,10 +40,17 @@ struct PlanOptions {
 };
 
 // The parameters asked about; without options the four of a cloth, stiffnesses about those of the asset.
-std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::MaterialBase& base) {
+std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::MaterialBase& base,
+                                 const std::vector<sysid::Axis>& held) {
   std::vector<sysid::Axis> axes;
   for (const auto& [name, text] : options.axes) axes.push_back(parse_searched(name, text));
-  return axes.empty() ? sysid::usual_ranges(base) : axes;
+  if (!axes.empty()) return axes;
+  axes = sysid::usual_ranges(base);
+  std::erase_if(axes, [&](const sysid::Axis& axis) {
+    return std::any_of(held.begin(), held.end(),
+                       [&](const sysid::Axis& hold) { return hold.name == axis.name; });
+  });
+  return axes;
 }
 
 // The parameters that a plan tells of.
@@ -92,8 +100,18 @@ nlohmann::ordered_json plan_json(const std::vector<sysid::PlannedExperiment>& ex
   return json;
 }
 
+// A search brings its own parameters, and what it held.
+void check_options(const PlanOptions& options) {
+  expect_ending("--out", options.out, {".json"});
+  if (options.run.empty()) return;
+  const std::string beside = ": found it beside --run, whose search has its own, expected one of the two";
+  if (!options.axes.empty()) throw data::InputError(sysid::option_of(options.axes.front().first) + beside);
+  if (!options.holds.empty()) throw data::InputError("--hold" + beside);
+}
+
 int run_plan(const CLI::App& verb, const PlanOptions& options) {
   stop_on_signals();
+  check_options(options);
   const int threads = thread_count(options.common);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   for (const data::Recording& recording : recordings)
@@ -106,12 +124,17 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   if (!replay.mesh.empty()) recordings.front() = sysid::make_replay(recordings.front(), replay).recording;
   std::vector<std::string> notices;
   sysid::PlanSettings settings;
-  settings.grid.base = material_base(asset, sim::make_sheet(recordings.front().mesh), notices);
+  const std::vector<sysid::Axis> held = parse_values(options.holds);
+  settings.grid.base = material_base(asset, sim::make_sheet(recordings.front().mesh), notices, held);
   settings.grid.score = score_settings(options.replay);
   settings.error = options.error;
   settings.keyframes = options.keyframes;
   if (options.run.empty()) {
-    settings.grid.axes = axes_of(options, settings.grid.base);
+    settings.grid.axes = axes_of(options, settings.grid.base, held);
+    settings.grid.fixed = held;
+    std::vector<sysid::Axis> all = settings.grid.axes;
+    all.insert(all.end(), held.begin(), held.end());
+    sysid::check_axes(all, settings.grid.base);
     settings.at = sysid::values_in_range(settings.grid.base, settings.grid.axes);
   } else {
     const sysid::SearchFolder found = sysid::load_search_folder(options.run);
@@ -194,6 +217,8 @@ void add_plan_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "plan.json")->required();
   add_parameter_options(*verb, options->axes);
+  add_hold_option(*verb, options->holds,
+                  "A value in place of the asset's, as bending=1e-4; it is not asked about");
   add_replay_options(*verb, options->replay);
   add_seed_option(*verb, options->common);
   add_cpu_option(*verb, options->common);

@@ -166,8 +166,10 @@ void print_prediction(const sysid::Prediction& prediction) {
 
 int run_predict(const CLI::App& verb, const PredictOptions& options) {
   stop_on_signals();
+  expect_ending("--out", options.out, {".json"});
   Found found = take_search(options);
   const data::Recording recording = data::load_recording(options.recording);
+  warn_of_doubts(recording);
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recording);
   check_kind(asset, recording);

@@ -11,6 +11,7 @@
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/recording_digest.h"
 #include "data/text.h"
@@ -139,6 +140,7 @@ nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const s
 int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   stop_on_signals();
   const data::Recording recording = data::load_recording(options.recording);
+  warn_of_doubts(recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
   check_kind(asset, recording);
   check_options(options.replay, asset);
@@ -224,7 +226,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
     if (sysid::is_at_bound(result.recordings.front().bounds_hit, parameter))
       warn(sysid::at_bound_text(parameter, recording.nuisance));
   if (options.common.json) {
-    std::cout << result_json(result, motion, identified).dump(2) << '\n';
+    std::cout << data::format_json(result_json(result, motion, identified));
   } else {
     const sysid::RecordingScore& fit = result.recordings.front();
     for (const sysid::KeyframeScore& frame : fit.keyframes)

@@ -8,6 +8,7 @@
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
+#include "data/json_reader.h"
 #include "data/writable.h"
 #include "sysid/report/recording_names.h"
 #include "sysid/report/report.h"
@@ -27,6 +28,7 @@ struct ReportOptions {
 };
 
 int run_report(const ReportOptions& options) {
+  expect_ending("--out", options.out, {".html", ".htm"});
   auto [summary, results] = sysid::load_search_folder(options.run);
   std::vector<std::optional<double>> horizons;
   for (const sysid::SummaryRecording& recording : summary.recordings) horizons.push_back(recording.horizon_s);
@@ -48,7 +50,8 @@ int run_report(const ReportOptions& options) {
   if (!options.out.empty()) data::check_file_free(out, options.common.force);
   sysid::write_report(summary, results, overlays, settings, out);
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-report/1"}, {"report", out}}.dump(2) << '\n';
+    std::cout << data::format_json(
+        nlohmann::ordered_json{{"schema", "flash-sysid-report/1"}, {"report", out}});
   } else {
     std::printf("%s\n", out.c_str());
   }

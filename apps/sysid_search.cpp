@@ -100,7 +100,7 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
                 1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
                 1000 * recording.time_offset);
   print_solver_check(summary);
-  if (!summary.next_experiments.empty() || summary.by_points)
+  if (!summary.next_experiments.empty() || summary.by_points || summary.exit_code != exit_done)
     for (const std::string& step : sysid::next_steps(summary)) std::printf("Next: %s\n", step.c_str());
   std::printf("%s\n%s\n", (fs::path(out) / "summary.json").c_str(), (fs::path(out) / "report.html").c_str());
 }
@@ -200,6 +200,10 @@ int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptio
   } else {
     print_answer(summary, search.out);
   }
+  // Of a long run this is what is left on the terminal.
+  if (summary.exit_code == exit_unusable)
+    std::cerr << "flash-sysid: the answer cannot be used (exit code 3): "
+              << data::message_line(summary.warnings.front()) << '\n';
   return summary.exit_code;
 }
 

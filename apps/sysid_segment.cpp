@@ -15,6 +15,7 @@
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
 #include "data/frame_files.h"
+#include "data/json_reader.h"
 #include "data/text.h"
 #include "data/writable.h"
 #include "sysid/capture/segment/segment_folder.h"
@@ -103,6 +104,9 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
   sysid::SegmentFolderSettings& settings = options.settings;
   settings.segment.crop = parse_crop(options.crop);
   check_lengths(options);
+  expect_each_once("views", options.views);
+  expect_each_once("--masks", options.masks);
+  expect_each_once("--extrinsics", options.extrinsics);  // two cameras do not stand in one place
   const std::vector<sysid::RawView> views = open_views(options);
   settings.find_table = !options.no_table;
   if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
@@ -138,7 +142,7 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
                        {"frames", segmented.table->frames},
                        {"agreeing", segmented.table->agreeing}};
     }
-    std::cout << json.dump(2) << '\n';
+    std::cout << data::format_json(json);
   } else {
     if (segmented.table && segmented.table->frames > 0) {
       const Eigen::Vector3d &p = segmented.table->plane.point, &n = segmented.table->plane.normal;

@@ -11,6 +11,7 @@
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
@@ -95,9 +96,31 @@ std::string name_of_folder(const std::string& folder) {
   return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
+// Throws InputError where the truth would take the place of a file of the recording.
+void check_truth_name(const SynthOptions& options) {
+  const fs::path name = fs::weakly_canonical(fs::absolute(options.truth))
+                            .lexically_relative(fs::weakly_canonical(fs::absolute(options.out)));
+  const bool within = !name.empty() && *name.begin() != "..";
+  const bool of_recording = name.has_parent_path() || name.extension() == ".tum" ||
+                            name == "recording.json" || name == "camera_info.yaml" || name == "tracks.csv" ||
+                            name == "placed.csv";
+  if (within && of_recording)
+    throw data::InputError("--truth-out: found " + options.truth +
+                           ", the name of a file of the recording, expected another, as truth.json");
+}
+
+void check_places(const SynthOptions& options) {
+  expect_each_once("--camera", options.cameras);
+  if (!options.truth.empty()) check_truth_name(options);
+  expect_ending("--truth-out", options.truth, {".json"});
+  data::check_folder_free(options.out, options.common.force);
+  if (!options.truth.empty()) data::check_file_free(options.truth, options.common.force);
+}
+
 // The recording of a solid again, with the marker tracks that the asset gives it.
 int run_twin(const SynthOptions& options) {
   const data::Recording recording = data::load_recording(options.like);
+  warn_of_doubts(recording);
   const data::Asset asset = data::load_asset(options.asset);
   if (!recording.is_solid())
     throw data::InputError("--like: found a sheet in " + recording.source +
@@ -115,7 +138,7 @@ int run_twin(const SynthOptions& options) {
   sysid::check_axes(axes, base);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
-  data::check_folder_free(options.out, options.common.force);
+  check_places(options);
   for (const std::string& notice : notices) say(options.common, notice);
 
   const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
@@ -130,15 +153,13 @@ int run_twin(const SynthOptions& options) {
       options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
   data::write_atomically(truth, sysid::truth_text(candidate, options.marker_noise, options.common.seed));
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
-                                        {"recording", options.out},
-                                        {"truth", truth},
-                                        {"keyframes", tracks.samples.size()},
-                                        {"points", 0},
-                                        {"unconverged_share", result.unconverged_share},
-                                        {"residual_max", result.residual_max}}
-                     .dump(2)
-              << '\n';
+    std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
+                                                          {"recording", options.out},
+                                                          {"truth", truth},
+                                                          {"keyframes", tracks.samples.size()},
+                                                          {"points", 0},
+                                                          {"unconverged_share", result.unconverged_share},
+                                                          {"residual_max", result.residual_max}});
   } else {
     std::printf("%s: %zu times of %zu markers\n%s\n", options.out.c_str(), tracks.samples.size(),
                 tracks.names.size(), truth.c_str());
@@ -159,8 +180,7 @@ int run_synth(SynthOptions options) {
   const sysid::MaterialBase base = material_base(asset, sim::make_sheet(mesh), notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
-  data::check_folder_free(options.out, options.common.force);
-  if (!options.truth.empty()) data::check_file_free(options.truth, options.common.force);
+  check_places(options);
   for (const std::string& notice : notices) say(options.common, notice);
 
   sysid::SynthSettings& settings = options.synth;
@@ -196,15 +216,13 @@ int run_synth(SynthOptions options) {
   Eigen::Index points = 0;
   for (const data::Points& cloud : synthetic.clouds) points += cloud.rows();
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
-                                        {"recording", options.out},
-                                        {"truth", truth},
-                                        {"keyframes", synthetic.clouds.size()},
-                                        {"points", points},
-                                        {"unconverged_share", synthetic.unconverged_share},
-                                        {"residual_max", synthetic.residual_max}}
-                     .dump(2)
-              << '\n';
+    std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
+                                                          {"recording", options.out},
+                                                          {"truth", truth},
+                                                          {"keyframes", synthetic.clouds.size()},
+                                                          {"points", points},
+                                                          {"unconverged_share", synthetic.unconverged_share},
+                                                          {"residual_max", synthetic.residual_max}});
   } else {
     std::printf("%s: %zu keyframes, %s points\n%s\n", options.out.c_str(), synthetic.clouds.size(),
                 data::format_count(static_cast<std::size_t>(points)).c_str(), truth.c_str());

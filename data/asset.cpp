@@ -11,6 +11,7 @@
 #include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/questioned_numbers.h"
 #include "data/text.h"
 
 namespace flash::data {
@@ -351,6 +352,7 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
   sheet.notices.push_back(source + ": mass = " + format_short(sheet.total_mass) + " kg, " +
                           format_short(m.areal_density) + " kg/m^2" +
                           (asset.object_mass ? " (obj_mass, the total, spread evenly over vertices)" : ""));
+  if (const std::string text = questioned(asset, m); !text.empty()) sheet.notices.push_back(text);
   return sheet;
 }
 
@@ -384,6 +386,7 @@ ResolvedSolid resolve_solid(const Asset& asset, double rest_volume) {
   name_unused(asset.bending_model.has_value(), "bending_model");
   if (!unused.empty())
     solid.notices.push_back(asset.source + ": " + unused + ": of sheets alone, not used for a solid");
+  if (const std::string text = questioned(asset, m); !text.empty()) solid.notices.push_back(text);
   return solid;
 }
 

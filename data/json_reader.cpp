@@ -77,9 +77,14 @@ class NamesOnce {
 
 constexpr std::size_t kLine = 110;
 
+/// What is no UTF-8, as a path may have it, is replaced.
+std::string text_of(const nlohmann::ordered_json& value) {
+  return value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t used, std::string& text) {
   const bool nested = (value.is_object() || value.is_array()) && !value.empty();
-  const std::string flat = value.dump();
+  const std::string flat = text_of(value);
   if (!nested || indent + used + flat.size() + flat.size() / 10 < kLine) {
     // One line, with a blank after each comma and colon outside of strings.
     bool quoted = false, escaped = false;
@@ -98,7 +103,7 @@ void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t
     text += margin;
     std::size_t name_width = 0;
     if (value.is_object()) {
-      const std::string name = nlohmann::ordered_json(item.key()).dump() + ": ";
+      const std::string name = text_of(nlohmann::ordered_json(item.key())) + ": ";
       text += name;
       name_width = name.size();
     }

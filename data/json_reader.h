@@ -74,7 +74,7 @@ class JsonObject {
   std::string source_, field_;
 };
 
-/// JSON as people like to read it: what fits into a line stands in one.
+/// JSON as people like to read it: what fits into a line stands in one. What is no UTF-8 is replaced.
 std::string format_json(const nlohmann::ordered_json& value);
 
 }  // namespace flash::data

@@ -405,6 +405,7 @@ Recording load_recording(const std::string& path) {
   read_object(file, recording);
   read_markers(file, recording);
   read_table(file, recording);
+  judge_gravity(file, recording);
   read_trajectories(file, recording);
   read_grasps(file, recording);
   read_supports(file, recording);

@@ -123,7 +123,8 @@ struct Recording {
   std::vector<RecordedKeyframe> keyframes;
   NuisanceBounds nuisance;
   std::vector<std::string>
-      notices;  ///< what a reader should know: empty keyframes, ends of trajectories, ...
+      notices;                      ///< what a reader should know: empty keyframes, ends of trajectories, ...
+  std::vector<std::string> doubts;  ///< what is likely wrong, without the recording's name
 
   bool is_solid() const { return tetrahedra.rows() > 0; }
 };

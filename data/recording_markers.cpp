@@ -46,6 +46,58 @@ void check_near_object(const Recording& recording, const std::string& name, cons
                         "frame, and is object.start right?");
 }
 
+/// How a marker that stays behaves.
+struct Stay {
+  double drift = 0;      ///< largest distance between the means of a tenth of its samples each [m]
+  double scatter = 0;    ///< that the samples' noise alone hardly ever makes of it [m]
+  std::size_t seen = 0;  ///< samples
+};
+
+Stay stay_of(const MarkerTracks& tracks, const std::string& name) {
+  std::vector<Eigen::Vector3d> seen;
+  for (const MarkerSample& sample : tracks.samples)
+    for (std::size_t i = 0; i < sample.markers.size(); ++i)
+      if (tracks.names[static_cast<std::size_t>(sample.markers[i])] == name)
+        seen.emplace_back(sample.positions.row(static_cast<Eigen::Index>(i)).transpose());
+  Stay stay;
+  stay.seen = seen.size();
+  if (seen.size() < 2) return stay;
+  const std::size_t parts = std::min<std::size_t>(10, seen.size());
+  std::vector<Eigen::Vector3d> means;
+  for (std::size_t k = 0; k < parts; ++k) {
+    const std::size_t from = k * seen.size() / parts, to = (k + 1) * seen.size() / parts;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = from; i < to; ++i) sum += seen[i];
+    means.emplace_back(sum / static_cast<double>(to - from));
+    for (const Eigen::Vector3d& other : means)
+      stay.drift = std::max(stay.drift, (means.back() - other).norm());
+  }
+  // Neighbours differ by noise, hardly by the drift; their median leaves out a jump.
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < seen.size(); ++i) steps.push_back((seen[i] - seen[i - 1]).norm());
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  constexpr double kHardlyEver = 3;  // medians of a step, for the farthest two of ten means
+  constexpr double kMost = 3e-3;     // no tracker is worse; steps of few samples are of the drift itself [m]
+  stay.scatter =
+      std::min(kMost, kHardlyEver * steps[steps.size() / 2] /
+                          std::sqrt(static_cast<double>(seen.size()) / static_cast<double>(parts)));
+  return stay;
+}
+
+/// A support that moves takes the frame of all markers along, or the marker is not on it.
+void check_stays(const JsonObject& object, const std::string& name, Recording& recording) {
+  constexpr double kDoubted = 1e-3, kMost = 5e-3;  // [m]
+  const Stay stay = stay_of(recording.markers.tracks, name);
+  if (stay.drift <= kDoubted + stay.scatter) return;
+  const std::string text =
+      "marker \"" + name + "\" moves by " + format_short(1e3 * stay.drift) + " mm over its " +
+      format_count(stay.seen) + " samples, expected one that stays where it is, within " +
+      format_short(1e3 * (kDoubted + stay.scatter)) + " mm: is it on the support, and does that stand still?";
+  if (stay.drift > kMost + stay.scatter)
+    throw input_error(object.source(), object.name_of("on_support"), text);
+  recording.doubts.push_back(object.name_of("on_support") + ": " + text);
+}
+
 }  // namespace
 
 void read_markers(const JsonObject& file, Recording& recording) {
@@ -74,6 +126,7 @@ void read_markers(const JsonObject& file, Recording& recording) {
       if (!name.is_string()) throw object.error("on_support", "a list of markers");
       markers.on_support.push_back(name.get<std::string>());
       check("on_support", markers.on_support.back());
+      check_stays(object, markers.on_support.back(), recording);
     }
   }
   for (const auto& [name, place] : markers.placed) check("placed", name);

@@ -7,7 +7,9 @@ namespace flash::data {
 
 class JsonObject;
 
-/// Reads `markers` of recording.json: tracks, and where the markers are on the object.
+/// Reads `markers` of recording.json: tracks, and where the markers are on the object. Throws InputError
+/// where a marker of `on_support` moves by more than 5 mm; from 1 mm on it is one of the recording's doubts.
+/// Both grow by what its scatter explains.
 void read_markers(const JsonObject& file, Recording& recording);
 
 /// A keyframe for each time of the tracks, among those that there are.

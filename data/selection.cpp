@@ -1,6 +1,7 @@
 #include "data/selection.h"
 
 #include <limits>
+#include <set>
 
 #include "data/json_reader.h"
 
@@ -43,6 +44,9 @@ Selection read_selection(const JsonObject& owner, Eigen::Index vertices) {
   if (select.has("vertices")) {
     selection.vertices = select.indices("vertices");
     if (selection.vertices.empty()) throw select.error("vertices", "at least one index");
+    if (std::set<int>(selection.vertices.begin(), selection.vertices.end()).size() !=
+        selection.vertices.size())
+      throw select.error("vertices", "each vertex once");
     for (const int vertex : selection.vertices)
       if (vertex >= vertices)
         throw select.error("vertices",

@@ -12,7 +12,7 @@ namespace flash::calib {
 struct DetectSettings {
   int threads = 0;    ///< 0: as many as there are processors
   std::string cache;  ///< folder that keeps what was found, by content; empty: none
-  std::function<void(const std::string&)> tell = {};  ///< called once where the disk of the cache is full
+  std::function<void(const std::string&)> tell = {};  ///< of the cache: a full disk, once; edited files
   double largest_rms = 10;   ///< a view whose pose fits no better shows no target [px]
   double largest_ratio = 6;  ///< nor one worse than that many times the usual view of the set, above 2 px
 };

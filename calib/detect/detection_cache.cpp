@@ -34,12 +34,19 @@ bool is_sound(const Sighting& sighting, int points) {
                      [](const Eigen::Vector2d& pixel) { return pixel.cwiseAbs().maxCoeff() < kFarthest; });
 }
 
-/// points: of the target.
+/// Of all other fields.
+std::string digest_of(nlohmann::json json) {
+  json.erase("digest");
+  return data::sha256(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+/// points: of the target. None where the file is not there, or is not as it was written.
 std::optional<Found> read(const std::string& path, int points) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
   try {
     const nlohmann::json json = data::load_json(path);
+    if (json.at("digest") != digest_of(json)) return std::nullopt;
     Found found;
     found.reason = json.at("reason").get<std::string>();
     for (const nlohmann::json& item : json.at("sightings")) {
@@ -63,6 +70,7 @@ void write(const Found& found, const std::string& path) {
     json["sightings"].push_back(
         {{"refiner", sighting.refiner}, {"points", sighting.points}, {"pixels", std::move(pixels)}});
   }
+  json["digest"] = digest_of(json);
   data::write_atomically(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
@@ -106,6 +114,10 @@ Found DetectionCache::get(const std::string& image, const std::function<Found()>
   }
   const std::string path = (std::filesystem::path(folder_) / (data::sha256(key_ + bytes) + ".json")).string();
   if (std::optional<Found> kept = read(path, points_)) return std::move(*kept);
+  if (std::error_code error; tell_ && std::filesystem::is_regular_file(path, error)) {
+    const std::scoped_lock lock(telling_);
+    tell_(path + ": is not as it was written; what it keeps of " + image + " is found anew");
+  }
   Found found = find();
   try {
     if (!found.is_open) write(found, path);

@@ -16,12 +16,13 @@ class DetectionCache {
  public:
   using Tell = std::function<void(const std::string&)>;
 
-  /// An empty folder keeps nothing. tell: called once where the disk has no room for what is to be kept.
+  /// An empty folder keeps nothing. tell: called once where the disk has no room for what is to be kept, and
+  /// for each file that is not as it was written; one at a time.
   DetectionCache(std::string folder, const std::optional<data::CameraIntrinsics>& camera,
                  const Target& target, Tell tell = {});
 
   /// What is kept for the picture, or what `find` returns; nothing is kept where `find` throws. A file that
-  /// cannot be understood is written anew.
+  /// was edited or cannot be understood is written anew.
   Found get(const std::string& image, const std::function<Found()>& find) const;
 
  private:
@@ -30,6 +31,7 @@ class DetectionCache {
   std::string key_;  ///< of everything but the picture
   Tell tell_;
   mutable std::once_flag told_;
+  mutable std::mutex telling_;
 };
 
 }  // namespace flash::calib

@@ -18,7 +18,17 @@ std::string text_of(const GridFile& grid) {
   json["axes"] = nlohmann::json::array();
   for (const Axis& axis : grid.axes)
     json["axes"].push_back({{"name", axis.name}, {"values", axis.values}, {"log", axis.logarithmic}});
-  return json.dump(1) + "\n";
+  return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+std::vector<std::string> texts_of(const data::JsonObject& file, const char* key) {
+  std::vector<std::string> texts;
+  if (!file.raw(key).is_array()) throw file.error(key, "a list of texts");
+  for (const nlohmann::json& text : file.raw(key)) {
+    if (!text.is_string()) throw file.error(key, "a list of texts");
+    texts.push_back(text.get<std::string>());
+  }
+  return texts;
 }
 
 }  // namespace
@@ -31,24 +41,23 @@ void save_grid_file(const GridFile& grid, const std::string& path) {
 
 GridFile load_grid_file(const std::string& path) {
   const nlohmann::json json = data::load_json(path);
-  if (!json.is_object() || json.value("schema", "") != kSchema || !json.contains("axes") ||
-      !json.contains("recordings"))
+  const data::JsonObject file(json, path);
+  if (file.string("schema", "") != kSchema || !file.has("axes") || !file.has("recordings"))
     throw data::InputError(path + ": schema: expected \"" + kSchema + "\" with axes and recordings");
   GridFile grid;
-  try {
-    for (const nlohmann::json& axis : json.at("axes")) {
-      grid.axes.push_back({axis.at("name"), axis.at("values").get<std::vector<double>>(), axis.at("log")});
-      if (grid.axes.back().values.empty())
-        throw data::input_error(path, "axes.values", "found none, expected at least one");
-    }
-    grid.recordings = json.at("recordings").get<std::vector<std::string>>();
-    if (json.contains("fingerprint") && json.at("fingerprint").is_object())
-      grid.fingerprint = json.at("fingerprint").get<Fingerprint>();
-  } catch (const nlohmann::json::exception& error) {
-    throw data::InputError(path + ": " + error.what());
+  for (const data::JsonObject& axis : file.objects("axes")) {
+    const Eigen::VectorXd values = axis.vector("values", -1);
+    if (values.size() == 0) throw axis.error("values", "at least one number");
+    if (!axis.has("log")) throw axis.error("log", "true or false");
+    grid.axes.push_back({axis.string("name"), {values.begin(), values.end()}, axis.boolean("log", false)});
   }
-  if (grid.recordings.empty())
-    throw data::input_error(path, "recordings", "found none, expected at least one");
+  grid.recordings = texts_of(file, "recordings");
+  if (grid.recordings.empty()) throw file.error("recordings", "at least one name");
+  if (file.has("fingerprint")) {
+    Fingerprint& fingerprint = grid.fingerprint.emplace();
+    const data::JsonObject texts = file.object("fingerprint");
+    for (const auto& [name, text] : texts.value().items()) fingerprint[name] = texts.string(name.c_str());
+  }
   return grid;
 }
 

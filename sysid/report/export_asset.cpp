@@ -49,15 +49,21 @@ Json samples(const Summary& summary, const char* weight) {
   return json;
 }
 
+/// What an object has under a name, where that is a text.
+std::string text_of(const Json& object, const std::string& name, const std::string& otherwise) {
+  const auto found = object.find(name);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : otherwise;
+}
+
 /// Where the base has its values from: by its own identification, or assumed.
 std::string source_of(const data::Asset& base, const std::string& name) {
   const Json known = Json::parse(base.identification, nullptr, false);
   if (!known.is_object()) return "assumed";
   const Json* const fixed = known.contains("fixed") ? &known["fixed"] : nullptr;
   if (fixed && fixed->is_object() && fixed->contains(name) && (*fixed)[name].is_object())
-    return (*fixed)[name].value("source", "assumed");
+    return text_of((*fixed)[name], "source", "assumed");
   const Json* const verdicts = known.contains("identifiable") ? &known["identifiable"] : nullptr;
-  if (verdicts && verdicts->is_object() && verdicts->value(name, "no") != "no") return "identified";
+  if (verdicts && verdicts->is_object() && text_of(*verdicts, name, "no") != "no") return "identified";
   return "assumed";
 }
 

@@ -80,6 +80,23 @@ void add_experiments(const Summary& summary, std::vector<std::string>& steps) {
                     " by a tenth: hold it at a value that is known, or record something else.");
 }
 
+/// What is left to do where the search itself proposes nothing: to look at what was seen, and at why.
+void add_looks(const Summary& summary, std::vector<std::string>& steps) {
+  const std::string why =
+      summary.warnings.empty() ? "" : " The search says: " + summary.warnings.front() + ".";
+  if (summary.best.empty())
+    steps.push_back(
+        "Replay one set of values, as flash-sysid replay RECORDING --asset ASSET -o overlay, with a "
+        "shorter --time-step or values nearer to the asset's, until it runs and has a score." +
+        why);
+  else
+    steps.push_back(
+        "Look at the estimate over what was seen, above and in best/: where they part from the "
+        "start, mesh, grasp, table, clocks or frames are wrong; where they never part, record a "
+        "motion that tells more (flash-sysid plan RECORDING --run RUN -o plan.json)." +
+        why);
+}
+
 }  // namespace
 
 std::vector<std::string> caveats(const Summary& summary) {
@@ -121,6 +138,7 @@ std::vector<std::string> next_steps(const Summary& summary) {
     steps.push_back("Export the tuned asset with its intervals: flash-sysid export RUN -o tuned.json" + but +
                     (but.empty() ? "" : ")"));
   }
+  if (steps.empty()) add_looks(summary, steps);
   return steps;
 }
 

@@ -155,6 +155,9 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
                            ": gravity is zero in recording.json: what is said of bending rests on inertia "
                            "alone, and is wrong where the sheet had weight");
   for (const Replay& replay : replays)
+    for (const std::string& doubt : replay.recording.doubts)
+      warnings.push_back(replay.recording.name + ": " + doubt);
+  for (const Replay& replay : replays)
     if (replay.recording.camera)
       for (const std::string& warning : replay.recording.camera->warnings)
         warnings.push_back(replay.recording.name + ": calibration of its camera: " + warning);

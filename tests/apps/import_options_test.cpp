@@ -27,6 +27,11 @@ TEST(ImportOptions, AGraspIsACornerVerticesOrAPosition) {
   for (const char* wrong : {"vertices:1,x", "corner:-1,0", "vertices:"})
     EXPECT_EQ(data::input_error_of([&] { parse_grasp(wrong); }),
               "--grasp: found \"" + std::string(wrong) + "\", expected whole numbers from 0 after the colon");
+  EXPECT_EQ(data::input_error_of([] { parse_grasp("vertices:99999999999"); }),
+            "--grasp: found \"vertices:99999999999\", expected numbers of vertices of the mesh, none above "
+            "2,147,483,647");
+  EXPECT_EQ(data::input_error_of([] { parse_grasp("vertices:3,1,3"); }),
+            "--grasp: found \"vertices:3,1,3\", expected each vertex once");
 }
 
 TEST(ImportOptions, EitherSideOfACropMayBeOpen) {

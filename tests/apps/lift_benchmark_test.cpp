@@ -87,8 +87,22 @@ TEST(LiftBenchmark, SizesBeyondTheMemoryAreRefused) {
             "--steps: 1,000,000 of 1,024 environments at once on 2 threads take about 66,036 MB of memory, "
             "expected at most the 25,000 MB that there are");
   EXPECT_EQ(refusal(1'000'000, 1, 1), "");
-  EXPECT_EQ(refusal(1000, 1'000'000, 250), "");
-  EXPECT_EQ(refusal(1'000'000, 1'000'000, 1'000'000, 0), "");  // nothing is known
+  EXPECT_EQ(refusal(1000, 100'000, 250), "");
+  EXPECT_EQ(refusal(1'000'000, 1'000'000, 1, 2e12).find("MB"), std::string::npos);
+}
+
+// 1,024 vertices by 250 steps by a million on two threads, a million of these a second on each.
+TEST(LiftBenchmark, DaysOfWorkAreRefused) {
+  LiftBenchmark benchmark = {.vertices = 1000, .environments = 1'000'000, .steps = 250, .threads = 2};
+  EXPECT_DOUBLE_EQ(least_seconds(benchmark), 128000);
+  EXPECT_EQ(data::input_error_of([&] { check(benchmark, 0); }),
+            "--envs: 1,000,000 environments of 250 steps of 1,024 vertices take more than 1.481 days on the "
+            "CPU, expected at most one: use fewer");
+  benchmark.environments = 100'000;
+  EXPECT_EQ(data::input_error_of([&] { check(benchmark, 0); }), "");
+  benchmark.environments = 1'000'000;
+  benchmark.device = Device::cuda;
+  EXPECT_EQ(data::input_error_of([&] { check(benchmark, 0); }), "");
 }
 
 }  // namespace

@@ -45,6 +45,32 @@ class TrackedSolid : public testing::Test {
   std::string tracks_;
 };
 
+TEST_F(TrackedSolid, AMarkerOnTheSupportThatMovesIsNamed) {
+  // `drift` over all samples, evenly, and noise to and fro [mm].
+  const auto tracks = [&](int samples, double drift, double noise) {
+    tracks_ = "t,marker,x,y,z\n";
+    for (int k = 0; k < samples; ++k) {
+      const std::string t = format_number(5 + 0.01 * k);
+      const double x = 1 + 1e-3 * (drift * k / (samples - 1) + (k % 2 == 0 ? noise : -noise));
+      tracks_ += t + ",tip,1.1,0.01,0.03\n" + t + ",base," + format_number(x) + ",0,0\n";
+    }
+  };
+  for (const int samples : {3, 10, 400}) {
+    tracks(samples, 9.5, 0);
+    const std::string text = message();
+    EXPECT_TRUE(text.starts_with("markers.on_support: marker \"base\" moves by ")) << text;
+    EXPECT_NE(text.find("expected one that stays where it is, within "), std::string::npos) << text;
+  }
+  tracks(400, 3, 0.05);
+  ASSERT_EQ(load().doubts.size(), 1U);
+  EXPECT_TRUE(load().doubts.front().starts_with("markers.on_support: marker \"base\" moves by 2.7"))
+      << load().doubts.front();
+  for (const double noise : {0.0, 0.3, 1.0}) {
+    tracks(400, 0.5, noise);
+    EXPECT_TRUE(load().doubts.empty()) << noise;
+  }
+}
+
 TEST_F(TrackedSolid, RefusesAMarkerFarFromTheObject) {
   tracks_ = "t,marker,x,y,z\n5,tip,1.1,0.01,10.03\n5,base,1,0,0\n5.5,tip,1.1,0.01,0.02\n";
   EXPECT_EQ(message(),

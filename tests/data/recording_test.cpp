@@ -222,6 +222,47 @@ TEST_F(RecordingFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed("/nuisance/time_s", -1), "nuisance.time_s: found -1, expected a number of 0 or above");
 }
 
+TEST_F(RecordingFiles, GravityThatLiftsTheSheetOffItsTableIsAnError) {
+  const auto with = [&](const json& gravity, const json& normal) {
+    json_["gravity"] = gravity;
+    json_["table"]["normal"] = normal;
+    return message();
+  };
+  EXPECT_EQ(with({0, 0, 9.81}, {0, 0, 2}),
+            "gravity: found [0,0,9.81], expected one that points into the table, whose normal is 0, 0, 1, as "
+            "0, 0, -9.81");
+  EXPECT_NE(with({0, 0, -9.81}, {0, 0, -1}), "");
+  EXPECT_NE(with({0.5, 0, 0.01}, {0, 0, 1}), "");
+  // A robot that hangs from the ceiling, a slope, a wall, and none.
+  for (const auto& [gravity, normal] : std::vector<std::pair<json, json>>{{{0, 0, 9.81}, {0, 0, -1}},
+                                                                          {{2, 0, -9.6}, {0, 0, 1}},
+                                                                          {{0, 0, -9.81}, {1, 0, 0}},
+                                                                          {{0, 0, 0}, {0, 0, 1}}}) {
+    EXPECT_EQ(with(gravity, normal), "");
+    EXPECT_TRUE(load().doubts.empty());
+  }
+}
+
+TEST_F(RecordingFiles, GravityThatIsNotTheEarthsIsDoubted) {
+  const auto doubts = [&](const json& gravity) {
+    json_["gravity"] = gravity;
+    return load().doubts;
+  };
+  using Texts = std::vector<std::string>;
+  EXPECT_EQ(doubts({0, 0, -1.62}),
+            Texts{"gravity: found 1.62 m/s^2, expected 9.81 on the Earth: every stiffness scales with it"});
+  EXPECT_EQ(doubts({0, 0, -98.1}).size(), 1U);
+  EXPECT_EQ(doubts({0, 0, -9.81}), Texts());
+  json_["gravity"] = {0, 0, -981};  // cm/s^2
+  EXPECT_EQ(message(),
+            "gravity: found [0,0,-981], expected metres a second squared, as 0, 0, -9.81; at most 100");
+  json_.erase("table");
+  EXPECT_EQ(doubts({0, 0, 9.81}),
+            Texts{"gravity: found 0, 0, 9.81, which points up, expected 0, 0, -9.81 unless the robot's base "
+                  "hangs from a ceiling"});
+  EXPECT_EQ(doubts({-9.75, 0.11, -1.12}), Texts());  // a beam that is clamped at a wall
+}
+
 TEST_F(RecordingFiles, GraspOffTheMeshIsAnError) {
   json_["object"]["start"]["T_base_object"] = {0.15, 0, 0, 0, 0, 0, 1};
   EXPECT_EQ(

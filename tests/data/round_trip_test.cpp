@@ -127,6 +127,7 @@ Recording draw_recording(const TemporaryFolder& folder, double clock) {
   recording.has_table = draw_chance(0.5);
   recording.table_point = draw(0, 1) * draw_direction();
   recording.table_normal = draw_direction();
+  if (recording.gravity.dot(recording.table_normal) > 0) recording.gravity *= -1;  // into the table
   Trajectory gripper = draw_trajectory(clock);
   gripper.poses.front().translation() = recording.base_from_object * Eigen::Vector3d(0.2, 0.2, 0);
   recording.trajectory_paths["gripper"] = folder / "gripper.tum";

@@ -93,7 +93,7 @@ def check_config(options, folder):
     """--config of the three programs."""
     os.mkfifo(folder / "pipe.toml")
     (folder / "folder.toml").mkdir()
-    for name, content in (("garbage", bytes(range(256))), ("zeros", bytes(5000)), ("braces", b"}{][\n"), ("empty", b""),
+    for name, content in (("garbage", bytes(range(256))), ("zeros", bytes(5000)), ("braces", b"}{][\n"), ("two", b"}{"), ("bracket", b"# fine\n[synth]\n  ]\n"), ("empty", b""),
                           ("long", b"a" * 2_000_000), ("key", b"quitness=1\n"), ("section", b"[grdi]\nenvs=8\n"),
                           ("range", b"[synth]\nrate=-1\n"), ("number", b"[synth]\nrate=\"often\"\n"),
                           ("verb_key", b"[synth]\nrat=5\n"), ("good", b"[synth]\nduration=0.2\nrate=20\nquiet=true\n")):
@@ -106,7 +106,8 @@ def check_config(options, folder):
         for file, *expected in (("garbage.toml", "garbage.toml:1"), ("zeros.toml", "zeros.toml:1"),
                                 ("pipe.toml", "pipe.toml", "a pipe"), ("/dev/zero", "/dev/zero", "a device"),
                                 ("/dev/full", "/dev/full", "a device"), ("folder.toml", "folder.toml", "a folder"),
-                                ("nowhere.toml", "nowhere.toml", "No such file"), ("braces.toml", "braces.toml"),
+                                ("nowhere.toml", "nowhere.toml", "No such file"), ("braces.toml", "braces.toml"), ("two.toml", 'two.toml:1: found "}{"'),
+                                ("bracket.toml", 'bracket.toml:3: found "]"'),
                                 ("long.toml", "long.toml"), ("key.toml", "key.toml: quitness", "unknown option"),
                                 ("section.toml", "section.toml: grdi", "unknown option or section")):
             yield from refused(options, folder, [tool, "--config", file, *verb], *expected)
@@ -122,6 +123,99 @@ def check_config(options, folder):
     done = program.call(options.sysid, "--config", "empty.toml", *synth, "--duration", "0.1", "--force", cwd=folder)
     yield done.returncode == 0, f"--config empty.toml: {done.stderr}"
     shutil.rmtree(folder / "out")
+
+
+def check_words(options, folder):
+    """Words that name nothing, something twice, or a file of another kind than is written."""
+    for tool in filter(None, (options.sysid, options.sim, options.calib)):
+        yield from refused(options, folder, [tool, "--verion"], "--verion: unknown option", 'did you mean "--version"?')
+        yield from refused(options, folder, [tool, "--confg", "x.toml"], "--confg: unknown option", 'did you mean "--config"?')
+        yield from refused(options, folder, [tool, "--json"], "--json: found before the verb, expected after it")
+        yield from refused(options, folder, [tool, "--config", "good.toml", "--xyzzyx"], "--xyzzyx: unknown option (see --help)")
+        done = program.call(tool, "--version")
+        yield done.returncode == 0 and done.stdout, f"--version: {done.returncode} {done.stderr}"
+    (folder / "triangle.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (folder / "same_view").symlink_to("view")
+    search = ["recording", "--asset", "asset.json"]
+    plan = [options.sysid, "plan", *search, "-o", "plan.json"]
+    segment = [options.sysid, "segment", "--no-table", "-o", "out"]
+    imported = [options.sysid, "import", "recording/frames", "--trajectory", "recording/gripper.tum", "--times", "rate:10",
+                "--mesh", "sheet:0.2x0.2:0.05:alternating", "-o", "out"]
+    for words, *expected in (
+            ([options.sim, "picture", "triangle.obj", "-o", "p.jpg"], '--out: found "p.jpg"', "ends in .png"),
+            ([options.sim, "picture", "triangle.obj", "-o", "p"], '--out: found "p"', "ends in .png"),
+            ([options.sim, "picture", "triangle.obj", "triangle.obj", "-o", "p.png"], "triangle.obj twice"),
+            ([options.sim, "bench", "--envs", "1,1"], "--envs: found 1 twice"),
+            ([options.sim, "bench", "--envs", "1000000", "--threads", "2"], "--envs: 1,000,000", "days"),
+            ([options.sysid, "export", "run", "-o", "tuned.yaml"], '--out: found "tuned.yaml"', "ends in .json"),
+            ([options.sysid, "predict", "run", "recording", "-o", "p.csv"], '--out: found "p.csv"', "ends in .json"),
+            ([*plan[:-1], "plan.txt"], '--out: found "plan.txt"', "ends in .json"),
+            ([options.sysid, "compare", "run", "run2", "-o", "c.html"], '--out: found "c.html"', "ends in .json"),
+            ([options.sysid, "report", "run", "-o", "r.pdf"], '--out: found "r.pdf"', "ends in .html"),
+            ([options.sysid, "synth", "--asset", "cloth.json", "--truth-out", "t.txt", "-o", "out"], '"t.txt"', "in .json"),
+            ([*segment, "view", "view"], "views: found view twice"),
+            ([*segment, "view", "same_view"], "views: found view and same_view, which are the same"),
+            ([*segment, "view", "many", "--extrinsics", "view/extrinsics.json", "view/extrinsics.json"], "--extrinsics: found", "twice"),
+            ([options.sysid, "compare", "run", "./run"], "runs: found run and ./run, which are the same"),
+            ([options.sysid, "repeatability", "recording", "recording"], "is the same recording"),
+            ([options.sysid, "grid", *search[:1], *search, "--bending", "1e-4,2e-4", "-o", "out"], "is the same recording"),
+            ([options.sysid, "report", "run", "--map", "bending,bending", "-o", "r.html"], "--map: found bending twice"),
+            ([options.sysid, "replay", *search, "--frames", "1,2,1", "-o", "out"], "--frames: found 1 twice"),
+            ([*imported, "--grasp", "vertices:99999999999"], '--grasp: found "vertices:99999999999"'),
+            ([*imported, "--grasp", "vertices:3,3"], '--grasp: found "vertices:3,3"', "each vertex once"),
+            ([*plan, "--bending", "1e-4"], "--bending: found one value", "--hold bending=0.0001"),
+            ([*plan, "--hold", "bending"], "--hold"),
+            ([*plan, "--run", "run", "--hold", "bending=1e-4"], "--hold: found it beside --run"),
+            ([*plan, "--run", "run", "--bending", "1e-5:1e-3:3:log"], "--bending: found it beside --run")):
+        yield from refused(options, folder, words, *expected)
+    done = program.call(*plan, "--bending", "5e-5:2e-4:2:log", "--friction", "0.2:0.4:2", "--hold", "poisson=0.2", "--time-step",
+                        "0.02", cwd=folder)
+    yield done.returncode == 0, f"plan --hold: {done.returncode} {done.stderr}"
+    planned = list(json.loads((folder / "plan.json").read_text())["parameters"]) if done.returncode == 0 else None
+    yield planned == ["bending", "friction"], f"plan --hold: {planned}"
+    for name in ("plan.json", "triangle.obj", "same_view"):
+        (folder / name).unlink(missing_ok=True)
+    # A name that is no UTF-8 is a name.
+    odd = os.fsdecode(b"odd\xff")
+    for words in ([options.sysid, "synth", "--asset", "cloth.json", "--kind", "hang", "--duration", "0.1", "-o", odd],
+                  [options.sysid, "export", "run", "-o", odd + ".json"]):
+        done = program.call(*words, "--json", cwd=folder)
+        yield done.returncode in (0, 3) and "exception" not in done.stderr, f"a name of odd bytes: {done.returncode} {done.stderr}"
+        yield json.loads(done.stdout or "0"), f"a name of odd bytes: {done.stdout[:200]}"
+    shutil.rmtree(folder / odd, ignore_errors=True)
+    (folder / (odd + ".json")).unlink(missing_ok=True)
+
+
+def check_units(options, folder):
+    """Numbers in other units than their fields: one notice with the usual range."""
+    for field, value, *expected in (("areal_density", 150, "areal density found 150 kg/m^2", "0.005 to 20"),
+                                    ("young", 50, "young with a thickness found 50 Pa", "1000 to 1e+12", "E t in N/m")):
+        props = program.ASSET["mechanical_props"] | {field: value}
+        (folder / "odd.json").write_text(json.dumps(program.ASSET | {"mechanical_props": props}))
+        done = program.call(options.sysid, "grid", "recording", "--asset", "odd.json", "--friction", "0.2,0.3", "--no-plan",
+                            "--no-solver-check", "--no-horizon", "-o", "odd_run", "--force", cwd=folder)
+        lines = [line for line in done.stderr.splitlines() if "is the unit right?" in line]
+        yield len(lines) == 1 and all(word in lines[0] for word in expected), f"{field} {value}: {lines} {done.stderr[:500]}"
+        hold = {"areal_density": "areal_density=0.2", "young": "young=5e4"}[field]
+        done = program.call(options.sysid, "grid", "recording", "--asset", "odd.json", "--friction", "0.2,0.3", "--hold", hold,
+                            "--no-plan", "--no-solver-check", "--no-horizon", "-o", "odd_run", "--force", cwd=folder)
+        yield "is the unit right?" not in done.stderr, f"--hold {hold}: {done.stderr}"
+    (folder / "odd.json").unlink()
+    shutil.rmtree(folder / "odd_run", ignore_errors=True)
+
+
+def check_unusable(options, folder):
+    """The last line on the terminal says that and why an answer cannot be used; the report says what to do next."""
+    done = program.call(options.sysid, "grid", "recording", "--asset", "asset.json", "--young", "4.9e4,5e4,5.1e4", "--no-plan",
+                        "--no-solver-check", "--no-horizon", "--tolerance", "1e-12", "--iterations", "1", "-o", "bad_run", cwd=folder)
+    yield done.returncode == 3, f"a search that does not converge: {done.returncode} {done.stderr}"
+    summary = json.loads((folder / "bad_run/summary.json").read_text())
+    last = done.stderr.splitlines()[-1]
+    yield last == f"flash-sysid: the answer cannot be used (exit code 3): {summary['warnings'][0]}", f"last line: {last}"
+    yield "Next: " in done.stdout, f"nothing to do next: {done.stdout}"
+    report = (folder / "bad_run/report.html").read_text()
+    yield '"next_steps":[]' not in report and '"next_steps":["' in report, "report.html: nothing to do next"
+    shutil.rmtree(folder / "bad_run")
 
 
 def check_values(options, folder):
@@ -375,7 +469,7 @@ def main():
     parser.add_argument("--calib", type=pathlib.Path, help="the program flash-calib")
     parser.add_argument("--only", default="", help="checks whose name has this")
     options = parser.parse_args()
-    checks = [check_config, check_values, check_device, check_names, check_help, check_places, check_calibration, check_guess,
+    checks = [check_config, check_words, check_units, check_unusable, check_values, check_device, check_names, check_help, check_places, check_calibration, check_guess,
               check_kills, check_digits, check_set_up, check_early_signals]
     done, failed = 0, 0
     with tempfile.TemporaryDirectory() as temporary:

@@ -176,11 +176,11 @@ def check_bad(sim, folder):
         yield from refused(sim, folder, ["mesh", name, "-o", "out.obj", "--flat", "flat.obj"], *expected)
     (folder / "sheet.ply").write_bytes(ply(sheet, False))
     for words, *expected in ((["sheet.ply", "-o", "out.stl"], "out.stl", "expected .ply, .obj or .vtk"),
-                             (["sheet.ply", "-o", "a.obj", "--flat", "a.obj"], "--flat"),
-                             (["sheet.ply", "-o", "a.obj", "--flat", "./a.obj"], "--flat", "the name of --out"),
-                             (["sheet.ply", "-o", "sheet.ply"], "sheet.ply", "exists already"),
-                             (["sheet.ply", "-o", "sheet.ply", "--force"], "--out", "the name of the scan"),
-                             (["sheet.ply", "-o", "a.obj", "--flat", "sheet.ply", "--force"], "--flat", "of the scan"),
+                             (["sheet.ply", "-o", "a.obj", "--flat", "a.obj"], "a.obj", "named twice"),
+                             (["sheet.ply", "-o", "a.obj", "--flat", "./a.obj"], "a.obj", "named twice"),
+                             (["sheet.ply", "-o", "sheet.ply"], "sheet.ply", "is read by this run"),
+                             (["sheet.ply", "-o", "sheet.ply", "--force"], "sheet.ply", "is read by this run"),
+                             (["sheet.ply", "-o", "a.obj", "--flat", "sheet.ply", "--force"], "sheet.ply", "is read by this run"),
                              (["sheet.ply", "-o", "a.obj", "--scale", "1e300"], "sheet.ply", "--scale"),
                              (["fin.obj", "-o", "a.obj", "--scale", "1e300"], "fin.obj", "--scale"),
                              (["sheet.ply", "-o", "a.obj", "--edge", "0"], "--edge"),

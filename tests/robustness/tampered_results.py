@@ -165,6 +165,15 @@ def summary_cases(verb):
                    last)
 
 
+def grid_cases(verb):
+    """grid.json, with fields of other types."""
+    for place, value in (("schema", 5), ("axes", "x"), ("axes", [5]), ("axes.0.name", 5), ("axes.0.values", ["x"]), ("axes.0.values", []),
+                         ("axes.0.log", "yes"), ("recordings", 5), ("recordings", [5]), ("fingerprint", "x"),
+                         ("fingerprint", {"a": 1})):
+        yield Case(f"{verb}: grid.json {place} {json.dumps(value)}", verb, edited("run/grid.json", place, value), "grid.json: ",
+                   place.split(".")[-1])
+
+
 def fit_cases():
     for name in ("registrations", "keyframes"):
         yield Case(f"fit: {name}.csv without its last line", "fit", table(name, lambda text: text[:-1]), f"{name}.csv",
@@ -177,6 +186,7 @@ def cases(fits):
         yield from table_cases(verb)
         yield from score_cases(verb)
         yield from digest_cases(verb)
+        yield from grid_cases(verb)
         if verb != "resume":  # which writes the summary
             yield from summary_cases(verb)
             yield Case(f"{verb}: the last line cut off", verb,

@@ -63,6 +63,25 @@ TEST(NextSteps, DoNotExportWhatCannotBeUsed) {
   EXPECT_FALSE(mentions(next_steps(summary), "export"));
 }
 
+TEST(NextSteps, AreNeverEmptyWhereTheAnswerCannotBeUsed) {
+  Summary summary = example_summary();
+  summary.exit_code = 3;
+  summary.warnings = {"the estimate did not converge"};
+  summary.unconverged = 0;
+  for (ParameterFinding& finding : summary.parameters) {
+    finding.identifiable = Identifiable::no;
+    finding.edge = RangeEdge::none;
+  }
+  EXPECT_TRUE(mentions(next_steps(summary), "Look at the estimate"));
+  EXPECT_TRUE(mentions(next_steps(summary), "The search says: the estimate did not converge."));
+  summary.exit_code = 0;
+  EXPECT_FALSE(next_steps(summary).empty());
+  Summary nothing;  // of candidates that all diverged
+  nothing.exit_code = 3;
+  nothing.warnings = {"every candidate diverged: none has a score"};
+  EXPECT_TRUE(mentions(next_steps(nothing), "--time-step"));
+}
+
 TEST(NextSteps, AnExportIsNeverProposedWithoutItsCaveats) {
   Summary summary = example_summary();
   summary.recordings[0].misfit.found = false;
