@@ -21,7 +21,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
-.PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
+.PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -154,6 +154,9 @@ locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever
 
 drape: build packages-test  ## Say how far drapes of a disc are from those of an independent solver, over bending length and mesh
 	$(PYTHON) tests/validation/drape.py --sim $(BUILD)/bin/flash-sim --out $(BUILD)/drape
+
+clamped-strip: build packages-test  ## Say how much softer than the beam a clamped strip is, with and without slopes, over its cells
+	$(PYTHON) tests/validation/clamped_strip.py --sim $(BUILD)/bin/flash-sim --out $(BUILD)/clamped_strip --documents docs/validation
 
 reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py
 	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \

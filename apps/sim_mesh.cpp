@@ -33,7 +33,7 @@ struct MeshOptions {
   data::ScanSettings scan;
   data::DepthFrames frames;
   double scale = 1;
-  bool points = false, tets = false, json = false, force = false;
+  bool points = false, tets = false, weld = false, json = false, force = false;
 };
 
 std::string millimetres(double metres) { return data::format_short(1000 * metres) + " mm"; }
@@ -196,12 +196,52 @@ int mesh_solid(const MeshOptions& options) {
   return exit_done;
 }
 
+/// The mesh as it is, but for vertices in one place, which become one.
+int mesh_welded(const MeshOptions& options) {
+  const data::Geometry given = data::load_geometry(options.input);
+  const bool is_solid = given.tetrahedra.rows() > 0;
+  std::string text;
+  Eigen::Index vertices = 0;
+  if (is_solid) {
+    data::TetMesh solid = data::load_tet_mesh(options.input, true);
+    solid.vertices *= options.scale;
+    vertices = solid.vertices.rows();
+    text = data::format_tet_mesh(solid, options.out);
+  } else {
+    data::TriangleMesh sheet = data::load_triangle_mesh(options.input, true);
+    sheet.vertices *= options.scale;
+    vertices = sheet.vertices.rows();
+    text = data::format_triangle_mesh(sheet, options.out);
+  }
+  end_after_signal();
+  data::write_atomically(options.out, text);
+  const Eigen::Index elements = is_solid ? given.tetrahedra.rows() : given.triangles.rows(),
+                     joined = given.points.rows() - vertices;
+  const char* kind = is_solid ? "tetrahedra" : "triangles";
+  if (options.json)
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sim-mesh/1"},
+                                        {"mesh", options.out},
+                                        {"vertices", vertices},
+                                        {kind, elements},
+                                        {"joined", joined},
+                                        {"exit_code", exit_done}}
+                     .dump(2)
+              << '\n';
+  else
+    std::printf("%s: %s vertices, %s %s; %s vertices in the place of another, or of no element, are gone\n",
+                options.out.c_str(), data::format_count(std::size_t(vertices)).c_str(),
+                data::format_count(std::size_t(elements)).c_str(), kind,
+                data::format_count(std::size_t(joined)).c_str());
+  return exit_done;
+}
+
 int mesh(const MeshOptions& options) {
   if (!options.frames.intrinsics.empty() && options.frames.poses.empty() == options.frames.extrinsics.empty())
     throw data::InputError("--intrinsics: depth frames need one of --poses and --extrinsics");
   if (options.frames.intrinsics.empty() && !(options.frames.poses + options.frames.extrinsics).empty())
     throw data::InputError("--poses and --extrinsics: are for depth frames, which need --intrinsics");
   data::check_file_free(options.out, options.force);
+  if (options.weld) return mesh_welded(options);
   if (options.tets) {
     data::format_tet_mesh({}, options.out);  // refuses the ending before the work
     return mesh_solid(options);
@@ -228,11 +268,12 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       "Examples:\n"
       "  flash-sim mesh scan.ply --edge 0.01 -o cloth.obj --flat cloth_flat.obj\n"
       "  flash-sim mesh depth --intrinsics camera_info.yaml --poses camera.tum -o cloth.obj\n"
-      "  flash-sim mesh solid.stl --scale 0.001 --tets --edge 0.005 -o solid.vtk");
+      "  flash-sim mesh solid.stl --scale 0.001 --tets --edge 0.005 -o solid.vtk\n"
+      "  flash-sim mesh part.msh --weld -o part.vtk");
   verb.add_option("scan", options->input,
-                  "Cloud or mesh (.ply .obj .stl .vtk .pcd), or a folder of .ply, .pcd or depth .png")
+                  "Cloud or mesh (.ply .obj .stl .vtk .msh .pcd), or a folder of .ply, .pcd or depth .png")
       ->required();
-  verb.add_option("-o,--out", options->out, "Mesh to write (.obj .ply .vtk; of --tets .vtk .tet)")
+  verb.add_option("-o,--out", options->out, "Mesh to write (.obj .ply .vtk; of tetrahedra .vtk .tet)")
       ->required();
   CLI::Option* flat =
       verb.add_option("--flat", options->flat, "Flat rest shape to write, of the same triangles");
@@ -260,9 +301,16 @@ void add_mesh_verb(CLI::App& app, Action& action) {
   verb.add_option("--depth-scale", options->frames.depth_scale, "Of depth frames: metres a count")
       ->check(positive_number())
       ->capture_default_str();
-  verb.add_flag("--tets", options->tets, "Fill a closed surface with tetrahedra; needs tetgen")
+  CLI::Option* tets =
+      verb.add_flag("--tets", options->tets, "Fill a closed surface with tetrahedra; needs tetgen")
+          ->excludes(flat)
+          ->excludes(points);
+  verb.add_flag(
+          "--weld", options->weld,
+          "Join the vertices in one place of a mesh of triangles or tetrahedra, and change nothing else")
       ->excludes(flat)
-      ->excludes(points);
+      ->excludes(points)
+      ->excludes(tets);
   verb.add_flag("--json", options->json, "Print what was made as JSON on stdout");
   verb.add_flag(
       "--force", options->force,

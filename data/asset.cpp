@@ -497,8 +497,9 @@ TriangleMesh load_asset_mesh(const Asset& asset) {
 
 TetMesh load_asset_tet_mesh(const Asset& asset) {
   if (is_mesh_spec(asset.mesh))
-    throw input_error(asset.source, "mesh",
-                      "found \"" + asset.mesh + "\", expected box:... or a .vtk or .tet file of tetrahedra");
+    throw input_error(
+        asset.source, "mesh",
+        "found \"" + asset.mesh + "\", expected box:... or a .vtk, .tet or .msh file of tetrahedra");
   TetMesh mesh = is_tet_mesh_spec(asset.mesh) ? parse_tet_mesh_spec(asset.mesh, asset.source, "mesh")
                                               : load_tet_mesh(asset.mesh);
   check_size(asset, mesh.vertices);

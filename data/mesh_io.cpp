@@ -9,13 +9,16 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/gmsh.h"
 #include "data/obj.h"
 #include "data/pcd.h"
 #include "data/ply.h"
 #include "data/stl.h"
 #include "data/tet_faces.h"
+#include "data/tet_fit.h"
 #include "data/text.h"
 #include "data/vtk.h"
+#include "data/weld.h"
 
 namespace flash::data {
 namespace {
@@ -81,10 +84,12 @@ Geometry parse(const std::string& path) {
   if (extension == ".vtk") return parse_vtk(read_file(path), path);
   if (extension == ".stl") return parse_stl(read_file(path), path);
   if (extension == ".tet") return parse_tet(read_file(path), path);
+  if (extension == ".msh") return parse_msh(read_file(path), path);
   if (extension == ".pcd") return {parse_pcd(read_file(path), path), {}, {}};
   const bool is_like_a_specification = path.find(':') != std::string::npos;
   throw InputError(
-      path + ": ending \"" + extension + "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet" +
+      path + ": ending \"" + extension +
+      "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd, .tet or .msh" +
       (is_like_a_specification ? ", or a mesh made on the spot, such as sheet:0.4x0.4:0.02" : ""));
 }
 
@@ -151,9 +156,10 @@ void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source) {
     throw input_error(source, "vertex " + std::to_string(lone - used.begin()), "belongs to no triangle");
 }
 
-TriangleMesh load_triangle_mesh(const std::string& path) {
+TriangleMesh load_triangle_mesh(const std::string& path, bool weld) {
   Geometry geometry = load_geometry(path);
   TriangleMesh mesh{std::move(geometry.points), std::move(geometry.triangles)};
+  if (weld) mesh = welded(mesh);
   check_triangle_mesh(mesh, path);
   return mesh;
 }
@@ -184,15 +190,17 @@ void check_tet_mesh(const TetMesh& mesh, const std::string& source) {
   const auto lone = std::find(used.begin(), used.end(), false);
   if (lone != used.end())
     throw input_error(source, "vertex " + std::to_string(lone - used.begin()), "belongs to no tetrahedron");
+  check_fit(mesh, source);
 }
 
-TetMesh load_tet_mesh(const std::string& path) {
+TetMesh load_tet_mesh(const std::string& path, bool weld) {
   Geometry geometry = load_geometry(path);
   if (geometry.tetrahedra.rows() == 0) throw InputError(path + ": found no tetrahedra");
   for (Eigen::Index i = 0; i < geometry.tetrahedra.rows(); ++i)
     if (signed_volume(geometry.points, geometry.tetrahedra.row(i)) < 0)
       std::swap(geometry.tetrahedra(i, 2), geometry.tetrahedra(i, 3));
   TetMesh mesh{std::move(geometry.points), std::move(geometry.tetrahedra)};
+  if (weld) mesh = welded(mesh);
   check_tet_mesh(mesh, path);
   return mesh;
 }

@@ -13,17 +13,18 @@ struct Geometry {
   Tetrahedra tetrahedra;
 };
 
-/// Reads .ply, .obj, .vtk (legacy), .stl, .pcd or .tet by the ending of the name. Throws InputError naming
-/// the file, and what is wrong: non-finite points with their count and first index, or an index out of range
-/// with its face.
+/// Reads .ply, .obj, .vtk (legacy), .stl, .pcd, .tet or .msh (Gmsh) by the ending of the name. Throws
+/// InputError naming the file, and what is wrong: non-finite points with their count and first index, or an
+/// index out of range with its face.
 Geometry load_geometry(const std::string& path);
 
-/// The triangles of .ply, .obj, .vtk or .stl. Also throws on no triangles, and names degenerate and duplicate
-/// ones.
-TriangleMesh load_triangle_mesh(const std::string& path);
+/// The triangles of .ply, .obj, .vtk, .stl or .msh. Also throws on no triangles, and names degenerate and
+/// duplicate ones. `weld`: vertices in one place become one first, and those of no triangle go.
+TriangleMesh load_triangle_mesh(const std::string& path, bool weld = false);
 
-/// The tetrahedra of .vtk or .tet; negative ones are turned. Also throws as check_tet_mesh does.
-TetMesh load_tet_mesh(const std::string& path);
+/// The tetrahedra of .vtk, .tet or .msh; negative ones are turned. Also throws as check_tet_mesh does.
+/// `weld`: as above.
+TetMesh load_tet_mesh(const std::string& path, bool weld = false);
 
 /// The points of .ply, .pcd, .obj or .vtk; faces do not count. May be empty. Points that are not finite, as
 /// the pixels of an organised cloud that saw nothing, are left out, whatever the format.
@@ -50,7 +51,7 @@ void save_point_cloud(const Points& points, const std::string& path);
 void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source);
 
 /// Throws InputError naming the first tetrahedron that is flat, has a negative volume, or overlaps a
-/// neighbour, and vertices of none.
+/// neighbour, vertices of none, and outer faces that do not fit, as check_fit does.
 void check_tet_mesh(const TetMesh& mesh, const std::string& source);
 
 }  // namespace flash::data

@@ -4,13 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "data/error.h"
 #include "data/mesh_io.h"
+#include "data/surface_crossing.h"
 #include "data/text.h"
+#include "data/weld.h"
 
 namespace flash::data {
 namespace {
@@ -21,23 +25,6 @@ int count_border_edges(const Triangles& triangles) {
     for (int k = 0; k < 3; ++k) ++uses[{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])}];
   return static_cast<int>(
       std::count_if(uses.begin(), uses.end(), [](const auto& edge) { return edge.second == 1; }));
-}
-
-/// Vertices at the same place become the first of them; those of no triangle go.
-TriangleMesh welded(const TriangleMesh& mesh) {
-  std::map<std::array<double, 3>, int> known;
-  TriangleMesh result;
-  result.triangles = mesh.triangles;
-  std::vector<int> kept;
-  for (int& vertex : result.triangles.reshaped()) {
-    const auto place = mesh.vertices.row(vertex);
-    const auto [found, is_new] =
-        known.emplace(std::array{place[0], place[1], place[2]}, static_cast<int>(kept.size()));
-    if (is_new) kept.push_back(vertex);
-    vertex = found->second;
-  }
-  result.vertices = mesh.vertices(kept, Eigen::all);
-  return result;
 }
 
 /// A vertex whose triangles do not hang together over edges; -1: there is none.
@@ -64,6 +51,23 @@ int pinched_vertex(const TriangleMesh& mesh) {
   return -1;
 }
 
+/// Numbers of the parts that hang together over vertices, of each vertex.
+std::vector<int> parts_of(const TriangleMesh& mesh) {
+  std::vector<int> above(static_cast<std::size_t>(mesh.vertices.rows()));
+  std::iota(above.begin(), above.end(), 0);
+  const auto root_of = [&](int vertex) {
+    while (above[static_cast<std::size_t>(vertex)] != vertex)
+      vertex = above[static_cast<std::size_t>(vertex)] =
+          above[static_cast<std::size_t>(above[static_cast<std::size_t>(vertex)])];
+    return vertex;
+  };
+  for (const auto& t : mesh.triangles.rowwise())
+    for (const int corner : {t[1], t[2]}) above[static_cast<std::size_t>(root_of(corner))] = root_of(t[0]);
+  std::vector<int> parts(above.size());
+  for (int v = 0; v < std::ssize(parts); ++v) parts[static_cast<std::size_t>(v)] = root_of(v);
+  return parts;
+}
+
 double volume_of(const TriangleMesh& mesh) {
   const Eigen::RowVector3d middle = mesh.vertices.colwise().mean();
   double volume = 0;
@@ -76,6 +80,23 @@ double volume_of(const TriangleMesh& mesh) {
 }
 
 }  // namespace
+
+void check_crossings(const TriangleMesh& mesh, const std::string& source, std::span<const int> part) {
+  const std::optional<TrianglePair> found = first_crossing(mesh, part);
+  if (!found) return;
+  const auto corners = [&](int t) {
+    const auto& row = mesh.triangles.row(t);
+    return "vertices " + std::to_string(row[0]) + ", " + std::to_string(row[1]) + ", " +
+           std::to_string(row[2]);
+  };
+  const Eigen::RowVector3d place = mesh.vertices.row(mesh.triangles(found->first, 0));
+  throw input_error(source, "triangle " + std::to_string(found->second),
+                    "of " + corners(found->second) + " passes through triangle " +
+                        std::to_string(found->first) + " of " + corners(found->first) + ", near (" +
+                        format_short(place[0]) + ", " + format_short(place[1]) + ", " +
+                        format_short(place[2]) +
+                        "); expected a closed surface that does not meet itself, which has one inside");
+}
 
 ObstacleMesh checked_obstacle_mesh(TriangleMesh mesh, const std::string& source) {
   check_triangle_mesh(mesh, source);
@@ -94,6 +115,8 @@ ObstacleMesh checked_obstacle_mesh(TriangleMesh mesh, const std::string& source)
                           ", " + format_short(place[1]) + ", " + format_short(place[2]) +
                           "); expected one fan of triangles about each vertex");
   }
+  // Whole parts may reach into each other, as a chair's legs into its seat: what is in one of them is inside.
+  if (result.closed) check_crossings(result.mesh, source, parts_of(result.mesh));
   if (result.closed)
     if (const double volume = volume_of(result.mesh); !(volume > 0))
       throw InputError(source + ": is inside out: found a volume of " + format_short(volume) +

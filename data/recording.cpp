@@ -351,8 +351,8 @@ void load_object_mesh(const std::string& mesh, const std::string& source, const 
   const std::string extension = lower_extension(mesh);
   if (is_tet_mesh_spec(mesh))
     solid = parse_tet_mesh_spec(mesh, source, field);
-  else if (!is_mesh_spec(mesh) &&
-           (extension == ".tet" || (extension == ".vtk" && load_geometry(mesh).tetrahedra.rows() > 0)))
+  else if (!is_mesh_spec(mesh) && (extension == ".tet" || ((extension == ".vtk" || extension == ".msh") &&
+                                                           load_geometry(mesh).tetrahedra.rows() > 0)))
     solid = load_tet_mesh(mesh);
   recording.mesh_spec = mesh;
   if (solid) {

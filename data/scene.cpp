@@ -191,7 +191,7 @@ std::string read_name(const JsonObject& object, const std::string& fallback) {
 }
 
 SceneFixed read_fixed(const JsonObject& object) {
-  object.expect_fields({"name", "vertices", "axes", "positions", "over"});
+  object.expect_fields({"name", "vertices", "axes", "positions", "over", "slopes"});
   SceneFixed fixed;
   fixed.name = read_name(object, fixed.name);
   fixed.over = object.not_negative("over", fixed.over);
@@ -201,6 +201,9 @@ SceneFixed read_fixed(const JsonObject& object) {
   for (std::size_t axis = 0; axis < 3; ++axis) fixed.axes[axis] = axes.find("xyz"[axis]) != std::string::npos;
   if (axes.empty() || axes.find_first_not_of("xyz") != std::string::npos)
     throw object.error("axes", "letters of xyz, such as \"z\" for a roller");
+  fixed.slopes = object.boolean("slopes", false);
+  if (fixed.slopes && fixed.axes != std::array{true, true, true})
+    throw object.error("slopes", "false, or axes xyz: what rolls keeps no slope");
   if (object.has("over") && !object.has("positions")) throw object.error("over", "positions to move to");
   if (!object.has("positions")) return fixed;
   const nlohmann::json& rows = object.raw("positions");
@@ -222,7 +225,7 @@ SceneFixed read_fixed(const JsonObject& object) {
 }
 
 ScenePrescribed read_prescribed(const JsonObject& object) {
-  object.expect_fields({"name", "vertices", "trajectory", "keyframes", "from", "to"});
+  object.expect_fields({"name", "vertices", "trajectory", "keyframes", "from", "to", "slopes"});
   ScenePrescribed prescribed;
   prescribed.name = read_name(object, prescribed.name);
   prescribed.vertices = read_vertices(object);
@@ -231,6 +234,7 @@ ScenePrescribed read_prescribed(const JsonObject& object) {
   prescribed.from = object.number("from", prescribed.from);
   prescribed.to = object.number("to", prescribed.to);
   if (!(prescribed.to > prescribed.from)) throw object.error("to", "a time after from, or null");
+  prescribed.slopes = object.boolean("slopes", false);
   return prescribed;
 }
 
@@ -305,7 +309,7 @@ void read_end_effectors(const JsonObject& file, Scene& scene) {
     effector.collides = object.boolean("collides", false);
     effector.friction = read_friction(object);
     for (const JsonObject& entry : object.objects("grasps")) {
-      entry.expect_fields({"object", "from", "to", "threshold", "zero_length", "closing_time"});
+      entry.expect_fields({"object", "from", "to", "threshold", "zero_length", "closing_time", "slopes"});
       SceneGrasp grasp;
       const auto is_object = [&](const SceneObject& candidate) { return candidate.name == grasp.object; };
       grasp.object =
@@ -318,6 +322,9 @@ void read_end_effectors(const JsonObject& file, Scene& scene) {
       grasp.threshold = entry.not_negative("threshold", grasp.threshold);
       grasp.zero_length = entry.boolean("zero_length", false);
       grasp.closing_time = entry.not_negative("closing_time", 0);
+      grasp.slopes = entry.boolean("slopes", false);
+      if (grasp.slopes && grasp.zero_length)
+        throw entry.error("slopes", "false, or zero_length false: what is pulled into a point has no slope");
       effector.grasps.push_back(grasp);
     }
     scene.end_effectors.push_back(effector);

@@ -80,7 +80,8 @@ struct SceneFixed {
   bool all = false;                               ///< every vertex of the object; `vertices` is empty then
   std::array<bool, 3> axes = {true, true, true};  ///< "x", "xy", ...: a roller fixes one axis
   Points positions;                               ///< one row a vertex [m]; empty: where they start
-  double over = 0.0;  ///< in which they move from their start to `positions`, evenly [s]
+  double over = 0.0;    ///< in which they move from their start to `positions`, evenly [s]
+  bool slopes = false;  ///< the sheet keeps its slope at them too
 };
 
 /// Vertices moved rigidly: x(t) = T(t) T(from)^-1 x(from).
@@ -90,6 +91,7 @@ struct ScenePrescribed {
   Trajectory trajectory;  ///< a TUM file, or keyframes {t, translation, rotation_xyzw}
   double from = 0.0;      ///< [s]
   double to = std::numeric_limits<double>::infinity();  ///< [s]
+  bool slopes = false;                                  ///< as SceneFixed
 };
 
 /// The same constant force on each of some vertices (a hung mass arrives here as mass times gravity, shared
@@ -121,6 +123,7 @@ struct SceneGrasp {
   bool zero_length =
       false;  ///< true: held vertices are pulled to the effector's origin; false: they keep their offsets
   double closing_time = 0.0;  ///< zero_length: over which they are pulled [s]
+  bool slopes = false;        ///< as SceneFixed
 };
 
 struct SceneEndEffector {

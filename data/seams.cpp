@@ -44,7 +44,7 @@ std::string seam_warning(const TriangleMesh& mesh) {
   return format_count(shared) + " of its " + format_count(static_cast<std::size_t>(mesh.vertices.rows())) +
          " vertices share a place with another and are not joined: the mesh " +
          (parts > 1 ? "falls into " + format_count(parts) + " parts" : "is slit there") +
-         "; flash-sim mesh makes one that is joined";
+         "; flash-sim mesh --weld joins them";
 }
 
 }  // namespace flash::data

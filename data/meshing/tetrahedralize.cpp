@@ -135,6 +135,7 @@ FilledSolid filled_solid(const TriangleMesh& surface, double edge, const std::st
   if (!checked.closed)
     throw InputError(source + ": is open along " + format_count(std::size_t(checked.border_edges)) +
                      " edges; expected a closed surface, which has an inside to fill");
+  check_crossings(checked.mesh, source);
   FilledSolid result;
   result.surface_volume = volume_of(checked.mesh);
   const double share = edge * edge * edge / (6 * std::sqrt(2));  // of a regular tetrahedron

@@ -10,16 +10,6 @@ namespace {
 using data::Points;
 using Eigen::Vector3d;
 
-/// Six times the volume of the tetrahedron a, b, c, d, in extended precision.
-long double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
-  using Extended = Eigen::Matrix<long double, 3, 1>;
-  const Extended u = (b.cast<long double>() - a.cast<long double>()),
-                 v = (c.cast<long double>() - a.cast<long double>()),
-                 w = (d.cast<long double>() - a.cast<long double>());
-  return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
-         u[2] * (v[0] * w[1] - v[1] * w[0]);
-}
-
 bool edges_pass(const Points& x, const data::Triangles& triangles, int s, int t) {
   const Vector3d face[3] = {x.row(triangles(t, 0)), x.row(triangles(t, 1)), x.row(triangles(t, 2))};
   for (int k = 0; k < 3; ++k)
@@ -35,13 +25,6 @@ bool share_a_vertex(const data::Triangles& triangles, int s, int t) {
 }
 
 }  // namespace
-
-bool passes(const Vector3d& a, const Vector3d& b, const Vector3d* x) {
-  const long double above = volume(x[0], x[1], x[2], a), below = volume(x[0], x[1], x[2], b);
-  if (!(above * below < 0)) return false;
-  const long double u = volume(a, b, x[0], x[1]), v = volume(a, b, x[1], x[2]), w = volume(a, b, x[2], x[0]);
-  return (u > 0 && v > 0 && w > 0) || (u < 0 && v < 0 && w < 0);
-}
 
 std::optional<std::pair<int, int>> first_intersection(PairSurface& surface, const Points& positions) {
   std::vector<Bounds> boxes;

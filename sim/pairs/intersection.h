@@ -2,13 +2,12 @@
 #include <optional>
 #include <utility>
 
+#include "data/surface_crossing.h"
 #include "sim/pairs/pair_surface.h"
 
 namespace flash::sim {
 
-/// Whether the segment from a to b passes through the triangle x[0], x[1], x[2]. What only touches does not
-/// pass.
-bool passes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d* x);
+using data::passes;
 
 /// Two triangles of the surface, which share no vertex, that pass through each other at `positions`; those of
 /// the lowest numbers. Empty where there are none.

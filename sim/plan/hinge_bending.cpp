@@ -69,6 +69,13 @@ double deviation(const Hinge& hinge, const HingePositions& x) {
   return std::remainder(hinge_angle(x) - hinge.rest_angle, 2 * M_PI);
 }
 
+/// Of the triangles that bend [m^2]. Between two stiff ones nothing does, whatever the weight.
+double bent_area(const Hinge& hinge) {
+  const auto [left, right] = hinge.rest_areas;
+  if (hinge.stiff[0] == hinge.stiff[1]) return left + right;
+  return hinge.stiff[0] ? right : left;
+}
+
 }  // namespace
 
 std::vector<Hinge> sheet_hinges(const Sheet& sheet) {
@@ -78,10 +85,11 @@ std::vector<Hinge> sheet_hinges(const Sheet& sheet) {
     Hinge hinge{{e.a, e.b, e.opposite_left, e.opposite_right},
                 0.0,
                 0.0,
-                {sheet.triangles[e.left].area, sheet.triangles[e.right].area}};
+                {sheet.triangles[e.left].area, sheet.triangles[e.right].area},
+                {sheet.triangles[e.left].stiff, sheet.triangles[e.right].stiff}};
     HingePositions x;
     for (int i = 0; i < 4; ++i) x.col(i) = sheet.rest.vertices.row(hinge.vertices[i]);
-    hinge.weight = (x.col(1) - x.col(0)).squaredNorm() / (hinge.rest_areas[0] + hinge.rest_areas[1]);
+    hinge.weight = (x.col(1) - x.col(0)).squaredNorm() / bent_area(hinge);
     hinge.rest_angle = hinge_angle(x);
     hinges.push_back(hinge);
   }
@@ -117,7 +125,7 @@ void hinge_response(const Hinge& hinge, const HingePositions& x, double& energy,
 }
 
 double yield_angle(const Hinge& hinge, double yield_curvature) {
-  return yield_curvature * std::sqrt((hinge.rest_areas[0] + hinge.rest_areas[1]) / hinge.weight);
+  return yield_curvature * std::sqrt(bent_area(hinge) / hinge.weight);
 }
 
 double flow_of(const Hinge& hinge, const HingePositions& x, double yield_angle) {

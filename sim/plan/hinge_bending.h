@@ -14,9 +14,10 @@ namespace flash::sim {
 /// as the mesh does.
 struct Hinge {
   std::array<int, 4> vertices;
-  double weight;                     ///< |e|^2 / (A_0 + A_1) of the rest shape
-  double rest_angle;                 ///< dihedral angle without moment, 0 where flat [rad]
+  double weight;      ///< |e|^2 / (A_0 + A_1) of the rest shape; beside a stiff one of the other's area
+  double rest_angle;  ///< dihedral angle without moment, 0 where flat [rad]
   std::array<double, 2> rest_areas;  ///< of triangles (0, 1, 2) and (1, 0, 3) [m^2]
+  std::array<bool, 2> stiff = {};    ///< of them: one that is leaves all bending to the other
 };
 
 /// Hinges of the interior edges, with the rest angles of sheet.rest.
@@ -45,7 +46,8 @@ void hinge_response(const Hinge& hinge, const HingePositions& x, double& energy,
                     Matrix12* hessian, double yield_angle = std::numeric_limits<double>::infinity());
 
 /// The angle from rest at which a hinge bends by `yield_curvature` [1/m]: that times (A_0 + A_1) / |e|, as
-/// its energy is that of the curvature angle |e| / (A_0 + A_1) over its two triangles.
+/// its energy is that of the curvature angle |e| / (A_0 + A_1) over its two triangles (over one, where the
+/// other is stiff).
 double yield_angle(const Hinge& hinge, double yield_curvature);
 
 /// How far the rest angle flows at the end of a step, so that the hinge is bent by `yield_angle` at most

@@ -21,7 +21,11 @@ Eigen::SparseMatrix<double> isometric_bending_stiffness(const Sheet& sheet) {
     const double right_a = cotangent(b - a, d - a), right_b = cotangent(a - b, d - b);
     const int vertices[] = {e.a, e.b, e.opposite_left, e.opposite_right};
     const double stencil[] = {left_b + right_b, left_a + right_a, -(left_a + left_b), -(right_a + right_b)};
-    const double area = sheet.triangles[e.left].area + sheet.triangles[e.right].area;
+    const RestTriangle &left = sheet.triangles[e.left], &right = sheet.triangles[e.right];
+    // A stiff triangle leaves all bending to the other.
+    const double area = left.stiff == right.stiff ? left.area + right.area
+                        : left.stiff              ? right.area
+                                                  : left.area;
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j)
         entries.emplace_back(vertices[i], vertices[j], stencil[i] * stencil[j] / area);

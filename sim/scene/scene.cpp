@@ -12,6 +12,7 @@
 #include "data/text.h"
 #include "sim/law/surface_mesh.h"
 #include "sim/scene/joined_bodies.h"
+#include "sim/scene/scene_slopes.h"
 #include "sim/scene/solid.h"
 
 namespace flash::sim {
@@ -129,12 +130,13 @@ Hold support_of(const data::SceneFixed& fixed, const Sheet& sheet, const data::P
 }
 
 void add_supports(const data::Scene& scene, const data::SceneObject& object, const Sheet& sheet,
-                  SceneParts& parts, Environment& environment) {
+                  SceneParts& parts, Environment& environment, std::vector<SlopeWish>& wishes) {
   const data::Points& start = environment.state.positions;
   const Eigen::Index count = mesh_vertices(sheet);
   for (const data::SceneFixed& fixed : object.fixed) {
     check_vertices(scene, object, "fixed", fixed.vertices, count);
     environment.holds.push_back(support_of(fixed, sheet, start));
+    wishes.push_back({"objects." + object.name + ".fixed", fixed.slopes});
   }
   for (const data::SceneLoad& load : object.loads) {
     check_vertices(scene, object, "loads", load.vertices, count);
@@ -151,11 +153,12 @@ void add_supports(const data::Scene& scene, const data::SceneObject& object, con
                                  .frame = parts.frame_of(prescribed.trajectory),
                                  .from = prescribed.from,
                                  .to = prescribed.to});
+    wishes.push_back({"objects." + object.name + ".prescribed", prescribed.slopes});
   }
 }
 
 void add_end_effectors(const data::Scene& scene, const std::string& object, SceneParts& parts,
-                       Environment& environment) {
+                       Environment& environment, std::vector<SlopeWish>& wishes) {
   for (const data::SceneEndEffector& effector : scene.end_effectors) {
     const int frame = parts.frame_of(effector.trajectory);
     if (effector.collides) {
@@ -163,17 +166,19 @@ void add_end_effectors(const data::Scene& scene, const std::string& object, Scen
                                     effector.friction};
       environment.obstacles.push_back(obstacle_of(scene, object, box, parts, frame));
     }
-    for (const data::SceneGrasp& grasp : effector.grasps)
-      if (grasp.object == object)
-        environment.holds.push_back(
-            {.name = effector.name,
-             .frame = frame,
-             .at_origin = grasp.zero_length,
-             .from = grasp.from,
-             .to = grasp.to,
-             .closing_time = grasp.zero_length ? grasp.closing_time : 0.0,
-             .reach =
-                 Reach{.object = object, .half_extents = 0.5 * effector.size, .threshold = grasp.threshold}});
+    for (const data::SceneGrasp& grasp : effector.grasps) {
+      if (grasp.object != object) continue;
+      environment.holds.push_back(
+          {.name = effector.name,
+           .frame = frame,
+           .at_origin = grasp.zero_length,
+           .from = grasp.from,
+           .to = grasp.to,
+           .closing_time = grasp.zero_length ? grasp.closing_time : 0.0,
+           .reach =
+               Reach{.object = object, .half_extents = 0.5 * effector.size, .threshold = grasp.threshold}});
+      wishes.push_back({"end_effectors." + effector.name + ".grasps", grasp.slopes});
+    }
   }
 }
 
@@ -216,7 +221,7 @@ void make_solid_body(const data::Asset& asset, SceneBody& body, std::vector<std:
 }
 
 SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, SceneParts& parts,
-                    std::vector<std::string>& notices) {
+                    std::vector<SlopeWish>& wishes, std::vector<std::string>& notices) {
   const data::Asset asset = data::load_asset(object.asset);
   SceneBody body;
   body.name = object.name;
@@ -244,8 +249,8 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, S
     const int frame = path == nullptr ? base_frame : parts.frame_of(*path);
     environment.obstacles.push_back(obstacle_of(scene, object.name, other, parts, frame));
   }
-  add_supports(scene, object, body.sheet, parts, environment);
-  add_end_effectors(scene, object.name, parts, environment);
+  add_supports(scene, object, body.sheet, parts, environment, wishes);
+  add_end_effectors(scene, object.name, parts, environment, wishes);
   for (const Hold& hold : environment.holds)
     if (hold.axes != std::array<bool, 3>{true, true, true} && !environment.obstacles.empty())
       notices.push_back(object.name + ": " + hold.name +
@@ -261,12 +266,16 @@ std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::ve
   for (const data::SceneObstacle& obstacle : scene.obstacles)
     if (const auto* described = std::get_if<data::SceneMesh>(&obstacle.shape))
       parts.meshes.emplace(obstacle.name, mesh_of(scene, obstacle, *described, notices));
+  std::vector<std::vector<SlopeWish>> wishes;  // of each body
   for (const data::SceneObject& object : scene.objects)
-    bodies.push_back(make_body(scene, object, parts, notices));
+    bodies.push_back(make_body(scene, object, parts, wishes.emplace_back(), notices));
   std::vector<data::Trajectory> trajectories;
   for (const data::Trajectory* trajectory : parts.trajectories) trajectories.push_back(*trajectory);
   const auto schedule = make_schedule(trajectories, 0.0, scene.time_step, steps);
-  for (SceneBody& body : bodies) body.environment.schedule = schedule;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    bodies[b].environment.schedule = schedule;
+    keep_scene_slopes(scene, steps, wishes[b], bodies[b], notices);
+  }
   if (scene.self_contact) {
     const data::SceneSelfContact& contact = *scene.self_contact;
     bodies = {joined(bodies)};

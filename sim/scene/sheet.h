@@ -16,7 +16,7 @@ struct RestTriangle {
   Eigen::Vector3i vertices;
   Eigen::Matrix2d inverse_edges;  ///< inverse of the 2 x 2 matrix of rest edges (x1 - x0, x2 - x0) [1/m]
   double area;                    ///< [m^2]
-  bool stiff = false;             ///< inside a clamp: does not bend (plate only)
+  bool stiff = false;             ///< inside a clamp: does not bend
   /// The mesh's x axis in the triangle's plane, its y axis where x stands upright.
   Eigen::Vector2d x_axis = Eigen::Vector2d::UnitX();
 };

@@ -8,6 +8,7 @@
 #include "data/error.h"
 #include "data/text.h"
 #include "sim/scene/grasp.h"
+#include "sim/scene/slopes.h"
 #include "sim/scene/solid.h"
 
 namespace flash::sysid {
@@ -99,12 +100,7 @@ void stiffen_clamped(const Replay& replay, sim::Sheet& sheet) {
     if (shape_of(grasp, replay.settings) != data::GraspShape::clamp || grasp.from > replay.beginning ||
         !std::isinf(grasp.to))
       continue;
-    std::vector<bool> held(static_cast<std::size_t>(replay.recording.mesh.vertices.rows()), false);
-    for (const int vertex : patch_of(replay, grasp, {})) held[static_cast<std::size_t>(vertex)] = true;
-    for (sim::RestTriangle& triangle : sheet.triangles)
-      if (std::all_of(triangle.vertices.begin(), triangle.vertices.end(),
-                      [&](int vertex) { return held[static_cast<std::size_t>(vertex)]; }))
-        triangle.stiff = true;
+    sim::keep_slopes(patch_of(replay, grasp, {}), sheet);
   }
 }
 

@@ -112,7 +112,7 @@ TEST_F(SceneRunTest, ASheetWithASeamThatIsNotJoinedIsWarnedOfOrRefused) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0],
             "cloth: 12 of its 42 vertices share a place with another and are not joined: the mesh falls into "
-            "2 parts; flash-sim mesh makes one that is joined");
+            "2 parts; flash-sim mesh --weld joins them");
   try {
     run(R"(, "self_contact": {})");
     FAIL() << "it has to be refused";

@@ -189,11 +189,10 @@ TEST(Asset, SolidsLoadTheirTetrahedraMovedAsTheAssetSays) {
   EXPECT_NE(
       input_error_of([&] { load_rest_mesh(asset("part.tet")); }).find("found TETRAHEDRON, expected TRIANGLE"),
       std::string::npos);
-  EXPECT_NE(
-      input_error_of([&] {
-        load_asset_tet_mesh(asset("sheet:0.1x0.1:0.01"));
-      }).find("mesh: found \"sheet:0.1x0.1:0.01\", expected box:... or a .vtk or .tet file of tetrahedra"),
-      std::string::npos);
+  EXPECT_NE(input_error_of([&] { load_asset_tet_mesh(asset("sheet:0.1x0.1:0.01")); })
+                .find("mesh: found \"sheet:0.1x0.1:0.01\", expected box:... or a .vtk, .tet or .msh file of "
+                      "tetrahedra"),
+            std::string::npos);
   EXPECT_NE(
       input_error_of([&] { load_asset_tet_mesh(asset("box:1x1:0.1")); }).find("expected box:WIDTHxDEPTH"),
       std::string::npos);

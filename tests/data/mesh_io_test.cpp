@@ -249,7 +249,7 @@ TEST(MeshIo, BrokenMeshesAreNamed) {
   EXPECT_EQ(message("a.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n"),
             ": DATASET STRUCTURED_POINTS, expected POLYDATA or UNSTRUCTURED_GRID");
   EXPECT_EQ(message("a.fbx", ""),
-            ": ending \".fbx\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
+            ": ending \".fbx\" is not known, expected .ply, .obj, .vtk, .stl, .pcd, .tet or .msh");
 }
 
 TEST(MeshIo, BrokenTetrahedraAreNamed) {

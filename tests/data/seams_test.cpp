@@ -18,7 +18,7 @@ TriangleMesh squares(int a, int b) {
 TEST(Seams, VerticesInOnePlaceAndThePartsAreCounted) {
   EXPECT_EQ(seam_warning(squares(4, 7)),
             "4 of its 8 vertices share a place with another and are not joined: the mesh falls into 2 parts; "
-            "flash-sim mesh makes one that is joined");
+            "flash-sim mesh --weld joins them");
 }
 
 TEST(Seams, ASlitIsToldFromParts) {
@@ -28,7 +28,7 @@ TEST(Seams, ASlitIsToldFromParts) {
   mesh.triangles.row(4) << 5, 4, 6;
   EXPECT_EQ(seam_warning(mesh),
             "2 of its 8 vertices share a place with another and are not joined: the mesh is slit there; "
-            "flash-sim mesh makes one that is joined");
+            "flash-sim mesh --weld joins them");
 }
 
 TEST(Seams, AMeshOfPartsThatStandApartHasNone) {

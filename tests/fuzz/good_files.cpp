@@ -29,6 +29,10 @@ void write_meshes(const std::string& folder) {
     data::save_triangle_mesh(sheet, folder + '/' + file);
   const data::TetMesh box = data::tet_box({0.1, 0.1, 0.1}, {1, 1, 1});
   for (const char* file : {"vtk/box.vtk", "tet/box.tet"}) data::save_tet_mesh(box, folder + '/' + file);
+  data::write_atomically(folder + "/msh/box.msh",
+                         "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n"
+                         "1 0 0\n0 1 0\n0 0 1\n$EndNodes\n$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n"
+                         "$EndElements\n");
   for (const char* file : {"pcd/cloud.pcd", "ply/cloud.ply", "recording/cloud.ply"})
     data::save_point_cloud(sheet.vertices, folder + '/' + file);
   data::write_atomically(folder + "/ply/ascii.ply",

@@ -154,6 +154,23 @@ def check_tets(sim, folder):
     yield from refused(sim, folder, ["mesh", "cube.obj", "--tets", "-o", "cube.stl"], "cube.stl", ".vtk or .tet")
 
 
+def check_welded(sim, folder):
+    """Doubled vertices and surfaces that pass through themselves are named; --weld joins the former, and nothing else."""
+    (folder / "two.tet").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nt 1 2 3 4\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 -1\nt 5 7 6 8\n")
+    done = program.call(sim, "mesh", "two.tet", "--weld", "--scale", "0.1", "-o", "joined.vtk", "--json", cwd=folder)
+    yield done.returncode == 0, f"weld: exit code {done.returncode}: {done.stderr}"
+    said = json.loads(done.stdout)
+    yield (said["vertices"], said["tetrahedra"], said["joined"]) == (5, 2, 3), f"weld: {done.stdout}"
+    corners = [(100 * (i & 1), 100 * (i >> 1 & 1), 100 * (i >> 2)) for i in range(8)]
+    (folder / "soup.obj").write_text(obj([corners[v] for t in CUBE for v in t], [(3 * t, 3 * t + 1, 3 * t + 2) for t in range(12)]))
+    done = program.call(sim, "mesh", "soup.obj", "--weld", "-o", "welded.obj", "--json", cwd=folder)
+    yield done.returncode == 0 and json.loads(done.stdout)["vertices"] == 8, f"weld: {done.stdout}{done.stderr}"
+    yield from refused(sim, folder, ["mesh", "two.tet", "--weld", "-o", "two.obj"], "two.obj", ".vtk or .tet")
+    yield from refused(sim, folder, ["mesh", "two.tet", "--weld", "--tets", "-o", "t.vtk"], "--weld")
+    (folder / "pierced.obj").write_text(obj([(50, 40, 150), *corners[1:]], CUBE))
+    yield from refused(sim, folder, ["mesh", "pierced.obj", "--tets", "-o", "p.vtk"], "pierced.obj: triangle", "passes through triangle")
+
+
 def check_bad(sim, folder):
     sheet = [(0.005 * (k % 20), 0.005 * (k // 20), 0) for k in range(400)]
     triangles = [t for k in range(380) if k % 20 < 19 for t in ((k, k + 1, k + 21), (k, k + 21, k + 20))]
@@ -211,7 +228,7 @@ def main():
     parser.add_argument("--sim", required=True, type=pathlib.Path)
     sim = parser.parse_args().sim.resolve()
     failures = 0
-    for check in (check_drape, check_depth, check_cap, check_spike, check_tets, check_bad):
+    for check in (check_drape, check_depth, check_cap, check_spike, check_tets, check_welded, check_bad):
         with tempfile.TemporaryDirectory() as name:
             for held, statement in check(sim, pathlib.Path(name)):
                 if not held:

@@ -1,9 +1,9 @@
-#include "sim/pairs/box_tree.h"
+#include "data/box_tree.h"
 
 #include <algorithm>
 #include <numeric>
 
-namespace flash::sim {
+namespace flash::data {
 
 namespace {
 
@@ -11,19 +11,19 @@ constexpr int leaf_size = 2;  ///< triangles
 
 }  // namespace
 
-BoxTree::BoxTree(const data::Triangles& triangles, const data::Points& places, std::span<const int> group)
+BoxTree::BoxTree(const Triangles& triangles, const Points& places, std::span<const int> group)
     : order_(static_cast<std::size_t>(triangles.rows())),
       triangles_(static_cast<std::size_t>(triangles.rows())),
       corners_(triangles) {
   std::iota(order_.begin(), order_.end(), 0);
-  data::Points centres(triangles.rows(), 3);
+  Points centres(triangles.rows(), 3);
   for (Eigen::Index t = 0; t < triangles.rows(); ++t)
     centres.row(t) =
         (places.row(triangles(t, 0)) + places.row(triangles(t, 1)) + places.row(triangles(t, 2))) / 3;
   if (!order_.empty()) split(0, static_cast<int>(order_.size()), centres, group);
 }
 
-int BoxTree::split(int first, int end, const data::Points& centres, std::span<const int> group) {
+int BoxTree::split(int first, int end, const Points& centres, std::span<const int> group) {
   const int own = static_cast<int>(nodes_.size());
   nodes_.push_back({{}, -1, -1, first, end});
   const bool several = group[order_[first]] != group[order_[end - 1]];
@@ -68,4 +68,4 @@ void BoxTree::refit(std::span<const Bounds> vertices) {
   }
 }
 
-}  // namespace flash::sim
+}  // namespace flash::data

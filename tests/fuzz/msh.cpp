@@ -1,0 +1,5 @@
+#include "data/mesh_io.h"
+
+#include "tests/fuzz/loader_fuzzer.h"
+
+FLASH_FUZZ_LOADER("mesh.msh", [](const std::string& path) { flash::data::load_tet_mesh(path); })
