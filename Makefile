@@ -118,9 +118,9 @@ knock-study: configure-test  ## Say whether hand-eye calibration sees knocks nea
 	cmake --build $(BUILD) -j $(JOBS) --target knock_study
 	$(BUILD)/tests/knock_study
 
-random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on, of solids with SOLIDS=1, that meet themselves at up to LAYERS=1 m/s; say what was not solved, and what energy, gaps and ways say
+random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on, of solids with SOLIDS=1, that meet themselves at up to LAYERS=1 m/s, of fast bodies with FAST=1; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
-	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --round $(ROUND) --mesh $(MESHES) $(if $(SOLIDS),--solid) $(if $(LAYERS),--layers $(LAYERS)) --list
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --round $(ROUND) --mesh $(MESHES) $(if $(SOLIDS),--solid) $(if $(LAYERS),--layers $(LAYERS)) $(if $(FAST),--fast) --list
 
 deep-starts: configure-test  ## Simulate SCENES random sheets that start across obstacles; say how fast they come out
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study

@@ -296,7 +296,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   std::vector<StepReport> reports(bodies.size());
   summary.self_contact = scene.self_contact.has_value();
   double nearest = no_layers;  // layers at the end of a step [m]
-  Deepest held, started;
+  Deepest held, started, squeezed;
   double inside_at_end = 0;  // depth at the start of the last step [m]
   std::string holder;
   std::vector<HoldWatch> watches(bodies.size());
@@ -355,6 +355,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         if (report.held_penetration.depth > held.penetration.depth)
           holder = holder_of(bodies[b].environment, report.held_penetration.vertex);
         held.see(report.held_penetration, b, time);
+        squeezed.see(report.no_room, b, time);
         summary.residual_max = data::worst(summary.residual_max, report.residual);
         summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
         summary.complementarity_max = data::worst(summary.complementarity_max, report.complementarity);
@@ -403,6 +404,11 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   if (held.penetration.depth > told_depth)
     summary.warnings.push_back(held.place(bodies) + ", where " + holder +
                                " holds it: is the height of the obstacle right, or the path?");
+  if (squeezed.penetration.depth > 0)
+    summary.warnings.push_back(
+        squeezed.place(bodies) +
+        ": obstacles leave it no room, and such steps are not solved; leave room where "
+        "obstacles close");
   if (started.penetration.depth > told_depth)
     summary.warnings.push_back(started.place(bodies) + ", where a step starts: the obstacle lets it out at " +
                                data::format_short(scene.solver.exit_speed) + " m/s" +

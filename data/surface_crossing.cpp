@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "data/box_tree.h"
@@ -14,14 +15,18 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Six times the volume of the tetrahedron a, b, c, d, in extended precision.
+/// Six times the volume of the tetrahedron a, b, c, d, in extended precision; 0 where it may be rounding
+/// alone.
 long double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   using Extended = Eigen::Matrix<long double, 3, 1>;
   const Extended u = (b.cast<long double>() - a.cast<long double>()),
                  v = (c.cast<long double>() - a.cast<long double>()),
                  w = (d.cast<long double>() - a.cast<long double>());
-  return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
-         u[2] * (v[0] * w[1] - v[1] * w[0]);
+  const long double found = u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
+                            u[2] * (v[0] * w[1] - v[1] * w[0]);
+  const long double rounding =
+      8 * std::numeric_limits<long double>::epsilon() * u.norm() * v.norm() * w.norm();
+  return std::abs(found) <= rounding ? 0 : found;
 }
 
 struct Triangle {

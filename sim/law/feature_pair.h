@@ -97,36 +97,71 @@ FLASH_HOST_DEVICE inline NearestPoints nearest_points(PairKind kind, const Vecto
   return kind == PairKind::vertex_face ? nearest_of_vertex_and_face(x) : nearest_of_edges(x);
 }
 
-/// A share of the straight motions `move` that the vertices of a pair can take while the distance stays above
-/// a quarter of that at the start, or of `reach` where that is less: 1 where all of it is free. It is
-/// conservative, and ends where at most half is left. Additive advancement (Li, Kaufman, Jiang 2021,
-/// "Codimensional incremental potential contact"): no point of a feature moves farther than its vertices do.
-FLASH_HOST_DEVICE inline double free_share(PairKind kind, const Vector3<double>* x,
-                                           const Vector3<double>* move, double reach) {
-  constexpr double kept_share = 0.25, step_share = 0.9;  // of the distance; of what surely is free
-  constexpr int most_steps = 1000;
+/// Straight motions of the vertices of a pair, less their mean.
+struct PairMotion {
+  Vector3<double> move[4];
+  double approach = 0;  ///< by how much they can bring its features together [m]
+};
+
+/// No point of a feature moves farther than its vertices do.
+FLASH_HOST_DEVICE inline PairMotion motion_of(PairKind kind, const Vector3<double>* move) {
   const Vector3<double> mean = 0.25 * (move[0] + move[1] + move[2] + move[3]);
   const int split = kind == PairKind::vertex_face ? 1 : 2;
-  double first = 0, second = 0;
+  PairMotion motion;
+  double longest[2] = {0, 0};
   for (int i = 0; i < 4; ++i) {
-    const double length = norm(move[i] - mean);
-    double& longest = i < split ? first : second;
-    longest = length > longest ? length : longest;
+    motion.move[i] = move[i] - mean;
+    const double length = norm(motion.move[i]);
+    double& own = longest[i < split ? 0 : 1];
+    own = length > own ? length : own;
   }
-  const double approach = first + second;
-  const double start = nearest_points(kind, x).distance;
-  const double least = kept_share * (start < reach ? start : reach);
-  if (approach <= start - least) return 1;
+  motion.approach = longest[0] + longest[1];
+  return motion;
+}
+
+/// A share of a motion in which the distance of a pair, `start` at first, stays above `least`: 1 where it
+/// does to the end. It ends where at most twice `least` is left. Additive advancement (Li, Kaufman, Jiang
+/// 2021, "Codimensional incremental potential contact").
+FLASH_HOST_DEVICE inline double advanced_share(PairKind kind, const Vector3<double>* x,
+                                               const PairMotion& motion, double start, double least) {
+  constexpr double step_share = 0.9;  // of what surely is free
+  constexpr int most_steps = 1000;
+  if (motion.approach <= start - least) return 1;
   double share = 0, distance = start;
   for (int step = 0; step < most_steps; ++step) {
-    share += step_share * (distance - least) / approach;
+    share += step_share * (distance - least) / motion.approach;
     if (share >= 1) return 1;
     Vector3<double> at[4];
-    for (int i = 0; i < 4; ++i) at[i] = x[i] + share * (move[i] - mean);
+    for (int i = 0; i < 4; ++i) at[i] = x[i] + share * motion.move[i];
     distance = nearest_points(kind, at).distance;
     if (distance <= 2 * least) return share;
   }
   return share;
+}
+
+/// A share of the straight motions `move` that the vertices of a pair can take while the distance stays above
+/// a quarter of that at the start, or of `reach` where that is less: 1 where all of it is free. It is
+/// conservative, and ends where at most half is left.
+FLASH_HOST_DEVICE inline double free_share(PairKind kind, const Vector3<double>* x,
+                                           const Vector3<double>* move, double reach) {
+  constexpr double kept_share = 0.25;  // of the distance
+  const double start = nearest_points(kind, x).distance;
+  return advanced_share(kind, x, motion_of(kind, move), start, kept_share * (start < reach ? start : reach));
+}
+
+/// Whether the distance of a pair stays above a hundredth of what it is at either end of straight motions. It
+/// is conservative: of what meets it is never said.
+FLASH_HOST_DEVICE inline bool stay_apart(PairKind kind, const Vector3<double>* x,
+                                         const Vector3<double>* move) {
+  constexpr double kept_share = 0.01;  // of the distance
+  const PairMotion motion = motion_of(kind, move);
+  const double before = nearest_points(kind, x).distance;
+  if (motion.approach <= (1 - kept_share) * before) return true;
+  Vector3<double> end[4];
+  for (int i = 0; i < 4; ++i) end[i] = x[i] + motion.move[i];
+  const double after = nearest_points(kind, end).distance;
+  const double least = kept_share * (before < after ? before : after);
+  return least > 0 && advanced_share(kind, x, motion, before, least) >= 1;
 }
 
 }  // namespace FLASH_LEVEL

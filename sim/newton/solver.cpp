@@ -1,6 +1,7 @@
 #include "sim/newton/solver.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
@@ -80,17 +81,34 @@ bool crushed(const Environment& environment, double layer_distance) {
   return environment.self_contact && layer_distance < crushed_share * environment.self_contact->thickness;
 }
 
+/// Whether obstacles leave layers no room, by less than a thickness: shorter steps would end nearly there.
+bool squeezed(const Environment& environment, const Penetration& no_room) {
+  return environment.self_contact && no_room.depth > 0 && no_room.depth < environment.self_contact->thickness;
+}
+
+/// Each way of the search is free of layers that meet, but together they may lead round a body that is in the
+/// straight way. Where they do, w.now becomes `before`, to which that way is free. Returns whether it was.
+bool go_straight(const StepProblem& problem, const Points& before, NewtonWorkspace& w) {
+  if (problem.layers->is_free(problem.contacts.environment.state.positions, w.now.positions)) return true;
+  w.now.positions = before;
+  problem.evaluate(w.now);
+  return false;
+}
+
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
 /// solved, or to all that rounding allows.
 bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
   const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
   bool free = start_search(problem, w);
+  const Points searched_from = w.now.positions;
   for (int portion = 0; !free && portion < most_portions; ++portion) {
     if (crushed(problem.contacts.environment, w.now.layers.closest)) break;
     iterate_to_balance(problem, portion_iterations, w, report);
     free = carry_on(problem, w, report);
   }
   iterate_to_balance(problem, w.settings.max_iterations, w, report);
+  const bool moved = w.now.positions != searched_from;
+  if (problem.layers && moved) free = go_straight(problem, searched_from, w) && free;
 
   report.residual = problem.relative_residual(w.now);
   report_contacts(problem, w.now, report);
@@ -141,20 +159,35 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
 
 /// One step of `h`, in halves where it cannot be solved as a whole, `halvings` times still. Once a half has
 /// failed the other is not divided any more: the step has not converged anyway. Nor do shorter steps help
-/// layers that holds have crushed.
+/// layers that holds have crushed, or what obstacles have squeezed.
 StepReport advance(Environment& environment, double h, int halvings, NewtonWorkspace& w) {
   const State start = environment.state;
   StepReport report;
-  if (try_step(environment, h, w, report)) return report;
+  const auto take_it = [&] {
+    if (w.settings.part) w.settings.part(environment.state);
+    return report;
+  };
+  if (try_step(environment, h, w, report)) return take_it();
   w.refactor = true;
   const bool stopped = w.settings.stop != nullptr && *w.settings.stop;
-  if (halvings <= 0 || stopped || crushed(environment, report.layer_distance)) return report;
+  const bool in_vain = crushed(environment, report.layer_distance) || squeezed(environment, report.no_room);
+  if (halvings <= 0 || stopped || in_vain) return take_it();
   const State whole = std::exchange(environment.state, start);
   const StepReport first = advance(environment, 0.5 * h, halvings - 1, w);
   StepReport parts = joined(first, advance(environment, 0.5 * h, first.converged ? halvings - 1 : 0, w));
   environment.state.time = whole.time;
   add_work(report, parts);
   return parts;
+}
+
+/// How often a step may be halved: where layers meet, until nothing goes farther in a part than their
+/// thickness.
+int halvings_of(const Environment& environment, const SolverSettings& settings) {
+  constexpr double most_parts = 4096;
+  if (!environment.self_contact || settings.halvings <= 0) return settings.halvings;
+  const double way = settings.time_step * environment.state.velocities.rowwise().norm().maxCoeff();
+  const double parts = std::clamp(way / environment.self_contact->thickness, 1.0, most_parts);
+  return std::max(settings.halvings, static_cast<int>(std::ceil(std::log2(parts))));
 }
 
 /// Layers thicker than the cells of a mesh would meet their own neighbours.
@@ -265,7 +298,7 @@ StepReport Solver::step(Environment& environment) {
     check_start(w.plan->sheet, w.layers->surface, environment.state.positions);
     check_apart(w.plan->sheet, w.layers->surface, environment);
   }
-  return advance(environment, h, w.settings.halvings, w);
+  return advance(environment, h, halvings_of(environment, w.settings), w);
 }
 
 std::vector<ContactForce> Solver::contacts(const Environment& environment) const {

@@ -56,6 +56,7 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
     report.layer_pairs = problem.layers->counts().pairs;
     report.layer_ways = problem.layers->counts().ways;
   }
+  report.no_room = deepest_without_room(problem.contacts, end.contacts, end.positions);
   report.held_penetration = deepest_held(problem.contacts, end.contacts, end.positions);
   report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
   report.start_penetration =
@@ -155,6 +156,7 @@ StepReport joined(const StepReport& first, const StepReport& second) {
   whole.penetration_max = worst(first.penetration_max, second.penetration_max);
   whole.held_penetration = deeper(first.held_penetration, second.held_penetration);
   whole.start_penetration = first.start_penetration;
+  whole.no_room = deeper(first.no_room, second.no_room);
   whole.layer_distance = std::min(first.layer_distance, second.layer_distance);
   whole.layer_pairs = std::max(first.layer_pairs, second.layer_pairs);
   whole.layer_ways += first.layer_ways;

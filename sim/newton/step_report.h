@@ -23,6 +23,7 @@ struct StepReport {
   double penetration_max = 0;     ///< deepest vertex below a surface, held ones too [m]
   Penetration held_penetration;   ///< the deepest that a hold carries below a surface
   Penetration start_penetration;  ///< the deepest other that started the step inside an obstacle
+  Penetration no_room;            ///< the deepest free vertex that obstacles close on, at the end
   double layer_distance =
       no_layers;               ///< of the nearest features of the surface that may meet, at the end [m]
   int layer_touches = 0;       ///< pairs of features that press each other at the end

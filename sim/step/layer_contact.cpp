@@ -13,8 +13,9 @@ using data::Points;
 
 namespace {
 
-constexpr double far = 1e300;         // [m]
-constexpr double margin_share = 0.5;  ///< of the thickness, that a vertex may move before a new search
+constexpr double far = 1e300;           // [m]
+constexpr double meeting_share = 1e-3;  ///< of the thickness: boxes that are farther apart do not meet
+constexpr double margin_share = 0.5;    ///< of the thickness, that a vertex may move before a new search
 
 void gather(const Points& x, const std::array<int, 4>& vertices, Vector3<double>* places) {
   for (int k = 0; k < 4; ++k) places[k] = vector3(x, vertices[k]);
@@ -127,13 +128,14 @@ bool LayerStep::cover(const BoxedPairs& candidates, const Points& from, const Po
   return all;
 }
 
-void LayerStep::search(const Points& from, const Points& to, double margin, BoxedPairs& candidates) {
+void LayerStep::search(const Points& from, const Points& to, double margin, double reach,
+                       BoxedPairs& candidates) {
   candidates.boxes.resize(static_cast<std::size_t>(from.rows()));
   for (Eigen::Index i = 0; i < from.rows(); ++i) {
     const Eigen::Array3d a = from.row(i).transpose().array(), b = to.row(i).transpose().array();
     candidates.boxes[i] = {a.min(b) - margin, a.max(b) + margin};
   }
-  find_candidates(memory_.surface, candidates.boxes, settings_.thickness, memory_.carried, candidates.pairs);
+  find_candidates(memory_.surface, candidates.boxes, reach, memory_.carried, candidates.pairs);
   ++counts_.searches;
   counts_.pairs = std::max(counts_.pairs, static_cast<long>(candidates.pairs.size()));
 }
@@ -141,7 +143,7 @@ void LayerStep::search(const Points& from, const Points& to, double margin, Boxe
 void LayerStep::add_forces(const Points& positions, LayerContact& contact, Points& force) {
   BoxedPairs& near = memory_.near;
   if (!cover(near, positions, positions)) {
-    search(positions, positions, margin_share * settings_.thickness, near);
+    search(positions, positions, margin_share * settings_.thickness, settings_.thickness, near);
     std::sort(near.pairs.begin(), near.pairs.end(),
               [](const CandidatePair& a, const CandidatePair& b) { return key_of(a) < key_of(b); });
   }
@@ -231,11 +233,12 @@ double LayerStep::bristle_energy(const LayerContact& contact) const {
   return energy;
 }
 
-double LayerStep::free_share(const Points& from, const Points& to) {
+template <typename Visit>
+void LayerStep::follow(const Points& from, const Points& to, const double& share, double reach,
+                       const Visit& visit) {
   const bool is_near = cover(memory_.near, from, to);
-  if (!is_near) search(from, to, 0, way_);
+  if (!is_near) search(from, to, 0, reach * settings_.thickness, way_);
   const Eigen::VectorXd lengths = (to - from).rowwise().norm();
-  double share = 1;
   for (const CandidatePair& pair : (is_near ? memory_.near : way_).pairs) {
     const auto& v = pair.vertices;
     Vector3<double> x[4], move[4];
@@ -245,12 +248,29 @@ double LayerStep::free_share(const Points& from, const Points& to) {
         pair.kind == PairKind::vertex_face
             ? lengths[v[0]] + std::max({lengths[v[1]], lengths[v[2]], lengths[v[3]]})
             : std::max(lengths[v[0]], lengths[v[1]]) + std::max(lengths[v[2]], lengths[v[3]]);
-    if (!may_come_near(pair.kind, x, share * longest + pair.thickness)) continue;
+    if (!may_come_near(pair.kind, x, share * longest + reach * pair.thickness)) continue;
     for (int k = 0; k < 4; ++k) move[k] = share * (vector3(to, v[k]) - x[k]);
     ++counts_.ways;
-    share *= sim::free_share(pair.kind, x, move, pair.thickness);
+    if (!visit(pair, x, move)) return;
   }
+}
+
+double LayerStep::free_share(const Points& from, const Points& to) {
+  double share = 1;
+  follow(from, to, share, 1, [&](const CandidatePair& pair, const auto& x, const auto& move) {
+    share *= sim::free_share(pair.kind, x, move, pair.thickness);
+    return true;
+  });
   return share;
+}
+
+bool LayerStep::is_free(const Points& from, const Points& to) {
+  bool free = true;
+  follow(from, to, 1, meeting_share, [&](const CandidatePair& pair, const auto& x, const auto& move) {
+    free = stay_apart(pair.kind, x, move);
+    return free;
+  });
+  return free;
 }
 
 std::vector<PairBristle> LayerStep::bristles_at_end(const LayerContact& contact) const {

@@ -99,6 +99,9 @@ class LayerStep {
   /// where all of it is.
   double free_share(const data::Points& from, const data::Points& to);
 
+  /// Whether no features meet on the straight way from `from` to `to`, at neither of which they do.
+  bool is_free(const data::Points& from, const data::Points& to);
+
   /// The bristles at the end of the step, as in State.
   std::vector<PairBristle> bristles_at_end(const LayerContact& contact) const;
 
@@ -115,8 +118,17 @@ class LayerStep {
   /// Whether the pairs of `candidates` are all that matter on the way between two positions.
   static bool cover(const BoxedPairs& candidates, const data::Points& from, const data::Points& to);
 
-  /// Fills in the pairs of all ways between two positions, and of a `margin` beside them.
-  void search(const data::Points& from, const data::Points& to, double margin, BoxedPairs& candidates);
+  /// Calls visit(pair, x, move) for each pair whose boxes may come nearer than a `reach` share of its
+  /// thickness on the first `share` of the straight way between two positions, with its vertices and their
+  /// motions. Ends where that returns false.
+  template <typename Visit>
+  void follow(const data::Points& from, const data::Points& to, const double& share, double reach,
+              const Visit& visit);
+
+  /// Fills in the pairs that come nearer than `reach` on any ways between two positions, and on those of a
+  /// `margin` beside them.
+  void search(const data::Points& from, const data::Points& to, double margin, double reach,
+              BoxedPairs& candidates);
 
   LayerMemory& memory_;
   const Environment& environment_;

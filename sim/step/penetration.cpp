@@ -33,6 +33,30 @@ Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, co
   return deepest;
 }
 
+Penetration deepest_without_room(const ContactStep& step, const ContactSet& contacts,
+                                 const data::Points& positions) {
+  constexpr double least_depth = 1e-9;  // [m]
+  Penetration deepest;
+  if (step.obstacles.size() < 2) return deepest;
+  for (int i = 0; i < positions.rows(); ++i) {
+    const VertexConstraint* constraint = contacts.find(i);
+    if (constraint != nullptr && constraint->freedom == Freedom::held) continue;
+    if (!(contacts.clearance[static_cast<size_t>(i)] < -least_depth)) continue;
+    std::vector<SurfaceGap<double>> gaps;
+    for (size_t k = 0; k < step.obstacles.size(); ++k)
+      gaps.push_back(step.gap(static_cast<int>(k), positions, i));
+    for (size_t k = 0; k < gaps.size(); ++k) {
+      const double depth = -gaps[k].distance;
+      if (depth <= std::max(least_depth, deepest.depth)) continue;
+      const bool faced = std::any_of(gaps.begin(), gaps.end(), [&](const SurfaceGap<double>& other) {
+        return other.distance < depth && dot(other.normal, gaps[k].normal) < 0;
+      });
+      if (faced) deepest = {depth, i, step.owners[k]};
+    }
+  }
+  return deepest;
+}
+
 std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const ContactSet& contacts) {
   std::vector<std::vector<int>> inside(step.obstacles.size());
   for (int i = 0; i < step.environment.state.positions.rows(); ++i) {

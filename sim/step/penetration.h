@@ -18,6 +18,11 @@ struct Penetration {
 /// Of one that was taken through the obstacle the surface is the face through which its way came in.
 Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
 
+/// The deepest free vertex that stands below the surface of an obstacle at the end of the step, because
+/// another that faces it is in its way: between them no place is left.
+Penetration deepest_without_room(const ContactStep& step, const ContactSet& contacts,
+                                 const data::Points& positions);
+
 /// The vertices that start the step inside each obstacle, without those that supports or grippers hold: one
 /// list an obstacle of the step, ascending; of a mesh the first alone has one.
 std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const ContactSet& contacts);

@@ -35,8 +35,8 @@ bool goes_through_mesh(const Mesh& mesh, Vector3d from, const Vector3d& to) {
   return false;
 }
 
-/// Whether the straight way from `from` to `to`, seen from the obstacle as it moves, goes through it: in by
-/// one face of a box and out by the one behind, or past the axis of a cylinder.
+}  // namespace
+
 bool goes_through(const Environment& environment, const Obstacle& obstacle, const Vector3d& from,
                   const Vector3d& to, double from_time, double to_time) {
   if (const auto* mesh = std::get_if<Mesh>(&obstacle.shape)) {
@@ -98,6 +98,8 @@ bool goes_through(const Environment& environment, const Obstacle& obstacle, cons
   }
   return false;
 }
+
+namespace {
 
 /// Of each vertex of a sheet, or of a solid [kg].
 Eigen::VectorXd masses(const RandomScene& scene) {

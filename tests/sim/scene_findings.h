@@ -18,6 +18,11 @@ struct SceneFindings {
   bool finite = true;
 };
 
+/// Whether the straight way from `from` to `to`, seen from the obstacle as it moves, goes through it: in by
+/// one face of a box and out by the one behind, or past the axis of a cylinder.
+bool goes_through(const Environment& environment, const Obstacle& obstacle, const Eigen::Vector3d& from,
+                  const Eigen::Vector3d& to, double from_time, double to_time);
+
 /// Simulates the scene to its end.
 SceneFindings observe(RandomScene scene);
 

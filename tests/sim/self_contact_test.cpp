@@ -11,6 +11,7 @@
 #include "sim/law/layer_law.h"
 #include "sim/pairs/intersection.h"
 #include "tests/sim/layer_scenes.h"
+#include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
 namespace {
@@ -229,6 +230,27 @@ TEST(SelfContact, APermutedBatchHasPermutedResults) {
   for (int e = 0; e < count; ++e)
     EXPECT_EQ((other.state(e).positions - batch.state(order[e]).positions).cwiseAbs().maxCoeff(), 0) << e;
   EXPECT_GT((batch.state(0).positions - batch.state(2).positions).cwiseAbs().maxCoeff(), 0);
+}
+
+/// What is pressed between them has no place at all: a step says whom, and ends at once.
+TEST(SelfContact, BoardsThatLeaveNoRoomAreTold) {
+  LayerScene world = pile(2, cloth, 0.1, 6);
+  const auto path = straight_path({0, 0, 0.01}, {0, 0, -0.001}, 0.2);
+  world.environment.obstacles.push_back(
+      {.shape = Plane{.normal = {0, 0, -1}}, .frame = add_frame(world.environment, path, h)});
+  Solver solver(world.sheet, {.time_step = h});
+  int told = 0;
+  for (int k = 0; k < 22; ++k) {
+    const StepReport report = solver.step(world.environment);
+    EXPECT_LE(report.iterations, 200) << k;  // nothing is tried again in parts
+    if (report.no_room.depth > 0) {
+      ++told;
+      EXPECT_FALSE(report.converged) << k;
+      EXPECT_GE(report.no_room.vertex, 0) << k;
+    }
+    EXPECT_EQ(report.no_room.depth > 0, k == 18 || k == 19) << k;  // the board is at -0.45 mm and at -1 mm
+  }
+  EXPECT_EQ(told, 2);
 }
 
 TEST(SelfContact, RefusesAStartThatPassesThroughItself) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "data/parallel.h"
+#include "tests/sim/random_fast_scenes.h"
 #include "tests/sim/random_layer_scenes.h"
 #include "tests/sim/scene_findings.h"
 
@@ -71,29 +72,80 @@ void print_layer_scenes(unsigned long first, std::size_t count, double fastest, 
                 sum.gains);
 }
 
+/// What an observer finds in `count` random scenes of fast bodies.
+void print_fast_scenes(unsigned long first, std::size_t count, bool list) {
+  using namespace flash::sim;
+  struct Sum {
+    int scenes = 0, touching = 0, steps = 0, halved = 0, most_iterations = 0, unsolved_scenes = 0,
+        unsolved = 0, infinite = 0, passing = 0, silent = 0, crossed = 0;
+  };
+  std::vector<FastFindings> findings(count);
+  std::vector<FastSceneKind> kinds(count);
+  flash::data::for_each_in_parallel(count, 0, [&](std::size_t k) {
+    const RandomFastScene scene = random_fast_scene(first + k);
+    const FastFindings found = findings[k] = observe(scene);
+    kinds[k] = scene.kind;
+    if (list && (found.unconverged > 0 || found.passing > 0 || found.crossed > 0 || !found.finite))
+      std::printf(
+          "%lu %s: %s: %d of %d steps not solved, %d parts of %d passing (%d told as solved), %d crossed%s\n",
+          first + k, to_string(scene.kind), scene.description.c_str(), found.unconverged, found.steps,
+          found.passing, found.parts, found.silent, found.crossed, found.finite ? "" : ", not finite");
+  });
+  std::map<std::string, Sum> sums;
+  for (std::size_t k = 0; k < count; ++k)
+    for (const std::string& key : {std::string(to_string(kinds[k])), std::string("~ all")}) {
+      Sum& sum = sums[key];
+      const FastFindings& found = findings[k];
+      ++sum.scenes;
+      sum.touching += found.touching > 0;
+      sum.steps += found.steps;
+      sum.halved += found.halved;
+      sum.most_iterations = std::max(sum.most_iterations, found.most_iterations);
+      sum.unsolved_scenes += found.unconverged > 0;
+      sum.unsolved += found.unconverged;
+      sum.infinite += !found.finite;
+      sum.passing += found.passing > 0;
+      sum.silent += found.silent > 0;
+      sum.crossed += found.crossed > 0;
+    }
+  std::printf("%-13s %7s %9s %9s | %6s %7s %9s %11s | %10s %8s %11s %8s\n", "kind", "scenes", "touching",
+              "unsolved", "steps", "halved", "unsolved", "iterations", "not finite", "passing", "in silence",
+              "crossed");
+  for (const auto& [key, sum] : sums)
+    std::printf("%-13s %7d %9d %9d | %6d %7d %9d %11d | %10d %8d %11d %8d\n", key.c_str(), sum.scenes,
+                sum.touching, sum.unsolved_scenes, sum.steps, sum.halved, sum.unsolved, sum.most_iterations,
+                sum.infinite, sum.passing, sum.silent, sum.crossed);
+}
+
 }  // namespace
 
 // What an observer finds in many random scenes, by kind and in all. Arguments: first seed, number of scenes,
 // then --list to name those with something to say, --deep for sheets that start across obstacles, --solid for
-// blocks of tetrahedra, --layers and a speed [m/s] for scenes whose surface meets itself, --round and the
+// blocks of tetrahedra, --layers and a speed [m/s] for scenes whose surface meets itself, --fast for bodies
+// that close at 1 to 40 m/s, --round and the
 // share of boxes and cylinders that are capsules and spheres instead,
 // --mesh and that of surfaces of triangles.
 int main(int argc, char** argv) {
   using namespace flash;
   const unsigned long first = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const std::size_t count = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1000;
-  bool list = false, deep = false, solid = false;
+  bool list = false, deep = false, solid = false, fast = false;
   double layers = 0;
   sim::ShapeShares shares;
   for (int k = 3; k < argc; ++k) {
     list = list || std::string(argv[k]) == "--list";
     solid = solid || std::string(argv[k]) == "--solid";
+    fast = fast || std::string(argv[k]) == "--fast";
     deep = deep || std::string(argv[k]) == "--deep";
     if (std::string(argv[k]) == "--layers" && k + 1 < argc) layers = std::strtod(argv[k + 1], nullptr);
     if (std::string(argv[k]) == "--round" && k + 1 < argc) shares.round = std::strtod(argv[k + 1], nullptr);
     if (std::string(argv[k]) == "--mesh" && k + 1 < argc) shares.meshes = std::strtod(argv[k + 1], nullptr);
   }
 
+  if (fast) {
+    print_fast_scenes(first, count, list);
+    return 0;
+  }
   if (layers > 0) {
     print_layer_scenes(first, count, layers, list);
     return 0;

@@ -145,6 +145,35 @@ TEST(FeaturePair, FreeWaysKeepTheirDistanceAndWhatStaysFarIsFree) {
   EXPECT_GT(cut, 1000);
 }
 
+TEST(FeaturePair, WhatStaysApartDoesSoOnAllOfItsWay) {
+  int apart = 0, near = 0;
+  Drawn drawn;
+  for (int draw = 0; draw < 4000; ++draw)
+    for (const PairKind kind : kinds) {
+      const Places x = drawn.places(draw);
+      const double size = std::pow(10, drawn.number(-3, 1));
+      Places move, end;
+      for (Place& m : move) m = drawn.place(size);
+      const NearestPoints nearest = nearest_points(kind, x.data());
+      if (draw % 4 < 2)  // at each other, and past
+        for (int i = 0; i < (kind == PairKind::vertex_face ? 1 : 2); ++i)
+          move[i] = move[i] - (drawn.number(0.5, 3) * nearest.distance) * nearest.normal;
+      for (int i = 0; i < 4; ++i) end[i] = x[i] + move[i];
+      const double kept = 0.01 * std::min(nearest.distance, nearest_points(kind, end.data()).distance);
+      double between_samples;
+      const double least = least_on_way(kind, x, move, 1, between_samples);
+      if (stay_apart(kind, x.data(), move.data())) {
+        ++apart;
+        ASSERT_GE(least, kept - 1e-12) << draw;
+      } else {
+        ++near;
+        ASSERT_LE(least, 2 * kept + between_samples + 1e-12) << draw;
+      }
+    }
+  EXPECT_GT(apart, 1000);
+  EXPECT_GT(near, 1000);
+}
+
 TEST(FeaturePair, FallsMeetWhenTheyShould) {
   const Places above_face = {{{0.2, 0.3, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
   const Places crossed = {{{-1, 0, 1}, {1, 0, 1}, {0, -1, 0}, {0, 1, 0}}};
