@@ -176,6 +176,10 @@ data::CropBox parse_box(const std::array<std::string, 3>& ranges, const std::str
 data::CropBox parse_crop(const std::array<std::string, 3>& ranges) { return parse_box(ranges, "crop"); }
 
 void read_options(const ImportOptions& options, sysid::ImportSettings& settings) {
+  const std::string segmented =
+      options.clouds.empty() ? std::string() : sysid::segmented_cell_of(options.clouds);
+  if (options.trajectory.empty() && segmented.empty())
+    throw data::InputError("import: expected --trajectory, or --markers in place of clouds");
   if (options.mesh.empty()) throw data::InputError("import: expected --mesh, as sheet:0.3x0.24:0.01");
   settings.mesh_spec = options.mesh;
   settings.mesh = load_mesh(options.mesh);
@@ -187,10 +191,6 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
     throw data::InputError("import: expected either a folder of clouds or --depth");
   if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");
   if (!options.depth.empty()) settings.depth = files_in(options.depth, {".png"}, "depth");
-  const std::string segmented =
-      options.clouds.empty() ? std::string() : sysid::segmented_cell_of(options.clouds);
-  if (options.trajectory.empty() && segmented.empty())
-    throw data::InputError("import: expected --trajectory, or --markers in place of clouds");
   if (!options.trajectory.empty()) {
     settings.trajectory = load_gripper(options.trajectory);
     settings.trajectory_path = options.trajectory;
