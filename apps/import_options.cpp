@@ -109,13 +109,13 @@ void take_segmented(const std::string& file, sysid::ImportSettings& settings) {
   } else if (!cell.trajectory.empty() && !are_equal(settings.trajectory, load_gripper(cell.trajectory))) {
     differs("--trajectory", "found " + settings.trajectory_path + ", which is another than that of");
   }
-  if (cell.times.size() > 0 && cell.times.size() != settings.clouds.size())
+  if (settings.times.empty() && cell.times.size() > 0 && cell.times.size() != settings.clouds.size())
     throw data::InputError(file + ": times: found " + std::to_string(cell.times.size()) + ", expected " +
                            std::to_string(settings.clouds.size()) + ", one a cloud beside it");
   if (settings.times.empty() && !cell.times.empty()) {
     settings.times = cell.times;
     taken.emplace_back("the times");
-  } else if (!cell.times.empty() && !are_equal(settings.times, cell.times)) {
+  } else if (cell.times.size() == settings.times.size() && !are_equal(settings.times, cell.times)) {
     differs("--times", "found others than those of");
   }
   if (cell.table) {

@@ -277,9 +277,9 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       ->required();
   CLI::Option* flat =
       verb.add_option("--flat", options->flat, "Flat rest shape to write, of the same triangles");
-  verb.add_option("--edge", options->scan.edge, "Length of the edges [m]")
-      ->check(positive_number())
-      ->capture_default_str();
+  CLI::Option* edge = verb.add_option("--edge", options->scan.edge, "Length of the edges [m]")
+                          ->check(positive_number())
+                          ->capture_default_str();
   verb.add_option("--smoothing", options->scan.smoothing,
                   "Standard deviation of the weights about a place of a cloud [m]; 0: 3/4 of --edge")
       ->check(number_from(0))
@@ -310,7 +310,8 @@ void add_mesh_verb(CLI::App& app, Action& action) {
           "Join the vertices in one place of a mesh of triangles or tetrahedra, and change nothing else")
       ->excludes(flat)
       ->excludes(points)
-      ->excludes(tets);
+      ->excludes(tets)
+      ->excludes(edge);
   verb.add_flag("--json", options->json, "Print what was made as JSON on stdout");
   verb.add_flag(
       "--force", options->force,

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -92,12 +93,18 @@ class Inputs {
   void add_file(const fs::path& path) {
     if (!is_file(path) || !known_.insert(whole_path(path)).second) return;
     files_.push_back(path.string());
-    if (path.extension() != ".json") return;
+    if (!begins_an_object(path)) return;  // whatever its ending: a scene may have any
     try {
       add_named(data::load_json(path.string()), path.string());
     } catch (const std::exception&) {
       return;  // its reader says what is wrong with it
     }
+  }
+
+  static bool begins_an_object(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    char first = 0;
+    return file >> first && first == '{';  // after white space
   }
 
   /// Files that a document names. What an asset tells of the search behind it is not read again.

@@ -64,7 +64,8 @@ Eigen::Vector3d parse_gravity(const std::string& text) {
 
 int tell_import(const data::Recording& recording, const std::string& out, const CommonOptions& options) {
   const std::string path = (fs::path(out) / "recording.json").string();
-  for (const std::string& notice : recording.notices) say(options, notice);
+  for (const std::string& notice : recording.notices)
+    notice.starts_with("import: warning: ") ? warn(notice) : say(options, notice);
   warn_of_doubts(recording);
   if (options.json) {
     std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-import/1"},

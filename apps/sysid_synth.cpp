@@ -199,7 +199,7 @@ int run_synth(SynthOptions options) {
   sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
   end_after_signal();
   if (options.common.force) {  // what makes a folder a recording goes first
-    for (const char* old : {"recording.json", "truth.json", "camera_info.yaml", "frames"})
+    for (const char* old : {"recording.json", "import.svg", "truth.json", "camera_info.yaml", "frames"})
       fs::remove_all(fs::path(options.out) / old);
     const auto camera = [&](int c) { return fs::path(options.out) / ("camera" + std::to_string(c)); };
     for (int c = 1; fs::exists(camera(c) / "depth"); ++c) fs::remove_all(camera(c));

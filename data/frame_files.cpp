@@ -63,6 +63,10 @@ std::string gap_in_names(const std::vector<std::string>& files) {
     const std::size_t last = name.find_last_of("0123456789");
     if (last == std::string::npos) return std::nullopt;
     std::size_t first = name.find_last_not_of("0123456789", last);
+    constexpr std::size_t kClock = 6, kDate = 8;  // 20261128_155959: its numbers leap at the minute
+    if (last - (first + 1) + 1 == kClock && first != std::string::npos && first >= kDate &&
+        name.find_last_not_of("0123456789", first - 1) + kDate + 1 == first)
+      return std::nullopt;
     if (first != std::string::npos && name[first] == '.')  // 1764000000.25
       first = name.find_last_not_of("0123456789.", last);
     return parse_number(std::string_view(name).substr(first + 1, last - first));

@@ -17,8 +17,10 @@ std::string fill_page(std::string_view page,
 }
 
 std::string inside_script(std::string json) {
-  for (std::size_t at = json.find("</"); at != std::string::npos; at = json.find("</", at + 3))
-    json.insert(at + 1, 1, '\\');
+  // In JSON it stands in strings alone. "</" ends a script, "<!--" hides its end.
+  constexpr std::string_view kEscaped = "\\u003c";
+  for (std::size_t at = json.find('<'); at != std::string::npos; at = json.find('<', at + kEscaped.size()))
+    json.replace(at, 1, kEscaped);
   return json;
 }
 

@@ -113,6 +113,7 @@ data::Recording import_tracks(const TrackImportSettings& settings) {
     data::write_atomically(staged_json, data::format_json(json));
   }
   staged.publish("recording.json");
+  fs::remove(fs::path(settings.out) / "import.svg");  // of what stood there before
   return data::load_recording((out / "recording.json").string());
 }
 

@@ -66,7 +66,10 @@ SegmentedCell load_segmented_cell(const std::string& path) {
 std::string segmented_cell_of(const std::string& clouds) {
   namespace fs = std::filesystem;
   const fs::path file = fs::weakly_canonical(fs::absolute(clouds)).parent_path() / "segment.json";
-  return fs::is_regular_file(file) ? file.string() : "";
+  // A name that other tools have too: theirs is none of ours.
+  std::error_code unknown;
+  if (!fs::is_regular_file(file, unknown)) return "";
+  return data::read_file(file.string()).find(kSchema) == std::string::npos ? "" : file.string();
 }
 
 double height_under(const SegmentedCell::Table& table, const Eigen::Vector3d& point) {

@@ -29,6 +29,7 @@ TEST(FrameFiles, AGapIsAStepFarLongerThanTheOthers) {
   EXPECT_EQ(gap_in_names({"10.png", "20.png", "30.png"}), "");  // one in ten was kept
   EXPECT_EQ(gap_in_names({"1.png", "3.png"}), "");
   EXPECT_EQ(gap_in_names({"start.png", "middle.png", "end.png"}), "");
+  EXPECT_EQ(gap_in_names({"20261128_155958.png", "20261128_155959.png", "20261128_160000.png"}), "");
   // Time stamps jitter.
   EXPECT_EQ(gap_in_names({"1764000000.000.png", "1764000000.093.png", "1764000000.205.png"}), "");
   EXPECT_EQ(gap_in_names({"1764000000.000.png", "1764000000.093.png", "1764000000.305.png"}),

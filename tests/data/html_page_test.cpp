@@ -19,7 +19,8 @@ TEST(HtmlPage, KeysAreReplacedOnceAndValuesAreNotReadAgain) {
 }
 
 TEST(HtmlPage, NoTextEndsTheScriptElement) {
-  EXPECT_EQ(inside_script(R"({"a": "</script></b>"})"), R"({"a": "<\/script><\/b>"})");
+  EXPECT_EQ(inside_script(R"({"a": "</script></b>"})"), R"({"a": "\u003c/script>\u003c/b>"})");
+  EXPECT_EQ(inside_script(R"({"a": "<!--<script>"})"), R"({"a": "\u003c!--\u003cscript>"})");
 }
 
 }  // namespace

@@ -28,6 +28,7 @@ def write_inputs(sysid, sim, work):
     (work / "meshed.json").write_text(json.dumps(program.ASSET | {"mesh": "scan.obj"}))
     (work / "scene.json").write_text(json.dumps(
         {"schema": "flash-scene/1", "timestep": 0.01, "steps": 1, "gravity": [0, 0, -9.81], "objects": {"cloth": "meshed.json"}}))
+    (work / "scene.txt").write_text((work / "scene.json").read_text().replace("meshed.json", "holds/asset.json"))
     (work / "options.toml").write_text("[plan]\nseed=1\n")
     (work / "links").mkdir()
     (work / "links/rec").symlink_to("../rec2")
@@ -78,6 +79,7 @@ def overwrites(sysid, sim):
                 "sheet:0.2x0.2:0.05:alternating"]
     yield [sysid, *imported, "-o", "rec2"], "rec2: holds rec2/"
     yield [sim, "run", "scene.json", "-o", "."], ".: holds scene.json"
+    yield [sim, "run", "scene.txt", "-o", "holds"], "holds: holds holds/asset.json"
     for words in (["picture", "scan.obj", "-o", "scan.obj"], ["mesh", "scan.obj", "-o", "scan.obj"],
                   ["mesh", "scan.obj", "-o", "new.obj", "--flat", "./scan.obj"]):
         yield [sim, *words], "scan.obj: is read by this run"

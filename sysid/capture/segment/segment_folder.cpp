@@ -302,7 +302,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
     data::save_tum(*settings.gripper, cell.trajectory);
   }
   save_segmented_cell(cell, (fs::path(staged.path()) / "segment.json").string());
-  staged.publish(result.picture);
+  staged.publish("segment.json");
   return result;
 }
 
