@@ -104,9 +104,11 @@ TEST_F(ImportOptionsOfAFolder, TakeWhatTheCloudsWereSegmentedWith) {
                 {"--times", [](ImportOptions& options, auto&) { options.times = "rate:15"; }},
                 {"--table-z",
                  [](ImportOptions&, sysid::ImportSettings& settings) { settings.table_height = 0.17; }}};
-  for (const auto& [option, change] : others) {
-    EXPECT_TRUE(data::input_error_of([&] { read(change, false); }).starts_with(option)) << option;
-    EXPECT_TRUE(read(change, true).taken[0].starts_with("warning: " + std::string(option))) << option;
+  for (const auto& each : others) {
+    EXPECT_TRUE(data::input_error_of([&] { read(each.second, false); }).starts_with(each.first))
+        << each.first;
+    EXPECT_TRUE(read(each.second, true).taken[0].starts_with("warning: " + std::string(each.first)))
+        << each.first;
   }
   EXPECT_EQ(
       read([](auto&, sysid::ImportSettings& settings) { settings.table_height = 0.06; }, false).table_height,
