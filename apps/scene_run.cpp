@@ -355,7 +355,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         if (report.held_penetration.depth > held.penetration.depth)
           holder = holder_of(bodies[b].environment, report.held_penetration.vertex);
         held.see(report.held_penetration, b, time);
-        squeezed.see(report.no_room, b, time);
+        if (!report.converged) squeezed.see(report.no_room, b, time);
         summary.residual_max = data::worst(summary.residual_max, report.residual);
         summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
         summary.complementarity_max = data::worst(summary.complementarity_max, report.complementarity);

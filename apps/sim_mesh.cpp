@@ -219,14 +219,12 @@ int mesh_welded(const MeshOptions& options) {
                      joined = given.points.rows() - vertices;
   const char* kind = is_solid ? "tetrahedra" : "triangles";
   if (options.json)
-    std::cout << nlohmann::ordered_json{{"schema", "flash-sim-mesh/1"},
-                                        {"mesh", options.out},
-                                        {"vertices", vertices},
-                                        {kind, elements},
-                                        {"joined", joined},
-                                        {"exit_code", exit_done}}
-                     .dump(2)
-              << '\n';
+    std::cout << data::format_json({{"schema", "flash-sim-mesh/1"},
+                                    {"mesh", options.out},
+                                    {"vertices", vertices},
+                                    {kind, elements},
+                                    {"joined", joined},
+                                    {"exit_code", exit_done}});
   else
     std::printf("%s: %s vertices, %s %s; %s vertices in the place of another, or of no element, are gone\n",
                 options.out.c_str(), data::format_count(std::size_t(vertices)).c_str(),
@@ -280,13 +278,15 @@ void add_mesh_verb(CLI::App& app, Action& action) {
   CLI::Option* edge = verb.add_option("--edge", options->scan.edge, "Length of the edges [m]")
                           ->check(positive_number())
                           ->capture_default_str();
-  verb.add_option("--smoothing", options->scan.smoothing,
-                  "Standard deviation of the weights about a place of a cloud [m]; 0: 3/4 of --edge")
-      ->check(number_from(0))
-      ->capture_default_str();
-  verb.add_option("--holes", options->scan.holes, "Diameter up to which holes are closed [m]")
-      ->check(number_from(0))
-      ->capture_default_str();
+  CLI::Option* smoothing =
+      verb.add_option("--smoothing", options->scan.smoothing,
+                      "Standard deviation of the weights about a place of a cloud [m]; 0: 3/4 of --edge")
+          ->check(number_from(0))
+          ->capture_default_str();
+  CLI::Option* holes =
+      verb.add_option("--holes", options->scan.holes, "Diameter up to which holes are closed [m]")
+          ->check(number_from(0))
+          ->capture_default_str();
   verb.add_option("--scale", options->scale, "Metres a unit of the scan: 0.001 of millimetres")
       ->check(positive_number())
       ->capture_default_str();
@@ -305,13 +305,15 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       verb.add_flag("--tets", options->tets, "Fill a closed surface with tetrahedra; needs tetgen")
           ->excludes(flat)
           ->excludes(points);
-  verb.add_flag(
-          "--weld", options->weld,
-          "Join the vertices in one place of a mesh of triangles or tetrahedra, and change nothing else")
+  verb.add_flag("--weld", options->weld,
+                "Join the vertices in one place of a mesh of triangles or tetrahedra, and change nothing but "
+                "its --scale")
       ->excludes(flat)
       ->excludes(points)
       ->excludes(tets)
-      ->excludes(edge);
+      ->excludes(edge)
+      ->excludes(smoothing)
+      ->excludes(holes);
   verb.add_flag("--json", options->json, "Print what was made as JSON on stdout");
   verb.add_flag(
       "--force", options->force,

@@ -103,6 +103,8 @@ class Inputs {
 
   static bool begins_an_object(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
+    for (const char mark : {'\xEF', '\xBB', '\xBF'})  // a byte order mark, which readers pass over
+      if (file.peek() == std::char_traits<char>::to_int_type(mark)) file.get();
     char first = 0;
     return file >> first && first == '{';  // after white space
   }

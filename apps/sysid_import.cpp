@@ -64,8 +64,9 @@ Eigen::Vector3d parse_gravity(const std::string& text) {
 
 int tell_import(const data::Recording& recording, const std::string& out, const CommonOptions& options) {
   const std::string path = (fs::path(out) / "recording.json").string();
+  constexpr std::string_view kDoubt = "import: warning: ";
   for (const std::string& notice : recording.notices)
-    notice.starts_with("import: warning: ") ? warn(notice) : say(options, notice);
+    notice.starts_with(kDoubt) ? warn("import: " + notice.substr(kDoubt.size())) : say(options, notice);
   warn_of_doubts(recording);
   if (options.json) {
     std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-import/1"},

@@ -9,6 +9,7 @@
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
+#include "data/asset_mesh.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"

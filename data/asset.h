@@ -82,19 +82,6 @@ struct ResolvedSolid {
 /// rest_volume: of the solid [m^3]. Throws InputError for triangles.
 ResolvedSolid resolve_solid(const Asset& asset, double rest_volume);
 
-/// The asset's triangle mesh. Throws InputError where it is so large that it must be in millimetres, and for
-/// tetrahedra.
-TriangleMesh load_rest_mesh(const Asset& asset);
-
-/// The asset's triangle mesh, moved by its transformation.
-TriangleMesh load_asset_mesh(const Asset& asset);
-
-/// The asset's tetrahedra, moved likewise. Throws InputError where they are so large, and for a sheet.
-TetMesh load_asset_tet_mesh(const Asset& asset);
-
-/// Rotation about fixed x, then y, then z [deg], then translation.
-Eigen::Matrix3d rotation_from_degrees(const Eigen::Vector3d& degrees);
-
 const char* to_string(Constitutive constitutive);  ///< "TRI_COROTATED", ...
 const char* to_string(BendingModel model);         ///< "plate", "isometric", "hinge"
 Constitutive parse_constitutive(const std::string& name, const std::string& source, const std::string& field);

@@ -56,40 +56,69 @@ std::vector<std::string> files_in_order(const std::string& folder,
   return files;
 }
 
-std::string gap_in_names(const std::vector<std::string>& files) {
-  // The last run of digits of a name: a count, or a time stamp, which jitters.
-  const auto number_in = [](const std::string& file) -> std::optional<double> {
-    const std::string name = fs::path(file).stem().string();
-    const std::size_t last = name.find_last_of("0123456789");
-    if (last == std::string::npos) return std::nullopt;
-    std::size_t first = name.find_last_not_of("0123456789", last);
-    constexpr std::size_t kClock = 6, kDate = 8;  // 20261128_155959: its numbers leap at the minute
-    if (last - (first + 1) + 1 == kClock && first != std::string::npos && first >= kDate &&
-        name.find_last_not_of("0123456789", first - 1) + kDate + 1 == first)
-      return std::nullopt;
-    if (first != std::string::npos && name[first] == '.')  // 1764000000.25
-      first = name.find_last_not_of("0123456789.", last);
-    return parse_number(std::string_view(name).substr(first + 1, last - first));
+namespace {
+
+/// The last run of digits of a name, with decimals where it has them.
+std::string_view number_in(std::string_view name) {
+  const auto is_digit = [&](std::size_t at) { return name[at] >= '0' && name[at] <= '9'; };
+  std::size_t end = name.size();
+  while (end > 0 && !is_digit(end - 1)) --end;
+  std::size_t begin = end;
+  const auto take_digits = [&] {
+    while (begin > 0 && is_digit(begin - 1)) --begin;
   };
-  std::vector<double> steps;
-  std::size_t widest = 0;
-  std::optional<double> before;
-  for (const std::string& file : files) {
-    const std::optional<double> number = number_in(file);
-    if (!number) return "";
-    if (before) {
-      steps.push_back(*number - *before);
-      if (steps.back() > steps[widest]) widest = steps.size() - 1;
-    }
-    before = number;
+  take_digits();
+  if (begin > 1 && name[begin - 1] == '.' && is_digit(begin - 2)) {  // 1764000000.25
+    --begin;
+    take_digits();
   }
-  if (steps.size() < 2) return "";
-  const double longest = steps[widest];
+  return name.substr(begin, end - begin);
+}
+
+/// Seconds of the day, where digits are those of a clock: HHMMSS, after YYYYMMDD or before milliseconds too.
+std::optional<double> clock_of(std::string_view digits) {
+  constexpr std::size_t kDate = 8, kClock = 6, kMilliseconds = 3;
+  if (digits.size() >= kDate + kClock) digits.remove_prefix(kDate);
+  if (digits.size() != kClock && digits.size() != kClock + kMilliseconds) return std::nullopt;
+  const std::optional<long> all = parse_integer(digits.substr(0, kClock));
+  if (!all) return std::nullopt;
+  const long hours = *all / 10'000, minutes = *all / 100 % 100, seconds = *all % 100;
+  if (hours > 23 || minutes > 59 || seconds > 59) return std::nullopt;
+  const std::optional<long> thousandths = parse_integer("0" + std::string(digits.substr(kClock)));
+  return static_cast<double>(3600 * hours + 60 * minutes + seconds) +
+         1e-3 * static_cast<double>(thousandths.value_or(0));
+}
+
+/// Index of the step that is more than one and a half times the median one, the longest; empty where none is.
+std::optional<std::size_t> leap_in(const std::vector<double>& numbers) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < numbers.size(); ++i) steps.push_back(numbers[i] - numbers[i - 1]);
+  if (steps.size() < 2) return std::nullopt;
+  const auto widest = std::max_element(steps.begin(), steps.end()) - steps.begin();
+  const double longest = steps[static_cast<std::size_t>(widest)];
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
-  if (!(longest > 1.5 * *middle)) return "";
-  return "no frame between " + fs::path(files[widest]).filename().string() + " and " +
-         fs::path(files[widest + 1]).filename().string();
+  if (!(longest > 1.5 * *middle)) return std::nullopt;
+  return static_cast<std::size_t>(widest);
+}
+
+}  // namespace
+
+std::string gap_in_names(const std::vector<std::string>& files) {
+  std::vector<double> counts, clocks;
+  for (const std::string& file : files) {
+    const std::string name = fs::path(file).stem().string();
+    const std::string_view digits = number_in(name);
+    const std::optional<double> count = parse_number(digits), clock = clock_of(digits);
+    if (!count) return "";
+    counts.push_back(*count);
+    if (clock) clocks.push_back(*clock);
+  }
+  const std::optional<std::size_t> leap = leap_in(counts);
+  // Digits of a clock leap at the minute, where its seconds do not.
+  if (!leap || (clocks.size() == counts.size() && !leap_in(clocks))) return "";
+  return "no frame between " + fs::path(files[*leap]).filename().string() + " and " +
+         fs::path(files[*leap + 1]).filename().string();
 }
 
 std::vector<double> load_frame_times(const std::string& path, std::size_t frames) {

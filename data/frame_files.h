@@ -15,7 +15,7 @@ std::vector<std::string> files_in_order(const std::string& folder,
 
 /// Where numbered names show that frames are missing: the widest gap between two numbers that follow each
 /// other, where it is more than one and a half times the median one; "no frame between A and B". Empty where
-/// there is none, and where names have no number.
+/// there is none, and where names have no number. Digits that may be of a clock are read as that too.
 std::string gap_in_names(const std::vector<std::string>& files);
 
 /// One time a frame [s], strictly increasing, from a CSV file with a column t or t_s. Throws InputError that

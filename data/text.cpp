@@ -21,6 +21,15 @@ std::vector<std::string_view> split(std::string_view line, std::string_view sepa
   return words;
 }
 
+std::string_view take_word(std::string_view& rest) {
+  const std::size_t begin = rest.find_first_not_of(" \t\r\n");
+  if (begin == std::string_view::npos) return {};
+  rest.remove_prefix(begin);
+  const std::string_view found = rest.substr(0, rest.find_first_of(" \t\r\n"));
+  rest.remove_prefix(found.size());
+  return found;
+}
+
 namespace {
 std::string_view without_plus(std::string_view word) {
   return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;

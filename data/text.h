@@ -30,6 +30,9 @@ std::string format_clock(double seconds);
 /// "2,113".
 std::string format_count(std::size_t count);
 
+/// The next word of a text, between blanks and ends of lines, which is taken off it; empty at the end.
+std::string_view take_word(std::string_view& rest);
+
 /// Lines of a text, by number from 1, without a trailing carriage return or a byte order mark before all.
 class LineReader {
  public:

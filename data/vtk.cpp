@@ -25,14 +25,7 @@ class Reader {
   }
 
   /// Empty at the end.
-  std::string_view word() {
-    const std::size_t begin = rest_.find_first_not_of(" \t\r\n");
-    if (begin == std::string_view::npos) return {};
-    rest_.remove_prefix(begin);
-    const std::string_view found = rest_.substr(0, rest_.find_first_of(" \t\r\n"));
-    rest_.remove_prefix(found.size());
-    return found;
-  }
+  std::string_view word() { return take_word(rest_); }
 
   long count() {
     const std::string_view text = word();

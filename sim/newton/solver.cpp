@@ -100,15 +100,15 @@ bool go_straight(const StepProblem& problem, const Points& before, NewtonWorkspa
 bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
   const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
   bool free = start_search(problem, w);
-  const Points searched_from = w.now.positions;
+  const Points searched_from = problem.layers ? w.now.positions : Points();
   for (int portion = 0; !free && portion < most_portions; ++portion) {
     if (crushed(problem.contacts.environment, w.now.layers.closest)) break;
     iterate_to_balance(problem, portion_iterations, w, report);
     free = carry_on(problem, w, report);
   }
   iterate_to_balance(problem, w.settings.max_iterations, w, report);
-  const bool moved = w.now.positions != searched_from;
-  if (problem.layers && moved) free = go_straight(problem, searched_from, w) && free;
+  if (problem.layers && w.now.positions != searched_from)
+    free = go_straight(problem, searched_from, w) && free;
 
   report.residual = problem.relative_residual(w.now);
   report_contacts(problem, w.now, report);
@@ -180,12 +180,13 @@ StepReport advance(Environment& environment, double h, int halvings, NewtonWorks
   return parts;
 }
 
-/// How often a step may be halved: where layers meet, until nothing goes farther in a part than their
-/// thickness.
+/// How often a step may be halved: where layers meet, until nothing that is as fast as at its start goes
+/// farther in a part than their thickness.
 int halvings_of(const Environment& environment, const SolverSettings& settings) {
   constexpr double most_parts = 4096;
   if (!environment.self_contact || settings.halvings <= 0) return settings.halvings;
   const double way = settings.time_step * environment.state.velocities.rowwise().norm().maxCoeff();
+  if (!std::isfinite(way)) return settings.halvings;
   const double parts = std::clamp(way / environment.self_contact->thickness, 1.0, most_parts);
   return std::max(settings.halvings, static_cast<int>(std::ceil(std::log2(parts))));
 }

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "data/asset.h"
+#include "data/asset_mesh.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/obstacle_mesh.h"

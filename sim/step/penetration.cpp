@@ -36,20 +36,22 @@ Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, co
 Penetration deepest_without_room(const ContactStep& step, const ContactSet& contacts,
                                  const data::Points& positions) {
   constexpr double least_depth = 1e-9;  // [m]
+  constexpr double facing = -0.99;      // of normals; surfaces that lean more leave room beside them
   Penetration deepest;
   if (step.obstacles.size() < 2) return deepest;
+  std::vector<SurfaceGap<double>> gaps;
   for (int i = 0; i < positions.rows(); ++i) {
+    if (!(contacts.clearance[static_cast<size_t>(i)] < -least_depth)) continue;
     const VertexConstraint* constraint = contacts.find(i);
     if (constraint != nullptr && constraint->freedom == Freedom::held) continue;
-    if (!(contacts.clearance[static_cast<size_t>(i)] < -least_depth)) continue;
-    std::vector<SurfaceGap<double>> gaps;
+    gaps.clear();
     for (size_t k = 0; k < step.obstacles.size(); ++k)
       gaps.push_back(step.gap(static_cast<int>(k), positions, i));
     for (size_t k = 0; k < gaps.size(); ++k) {
       const double depth = -gaps[k].distance;
       if (depth <= std::max(least_depth, deepest.depth)) continue;
       const bool faced = std::any_of(gaps.begin(), gaps.end(), [&](const SurfaceGap<double>& other) {
-        return other.distance < depth && dot(other.normal, gaps[k].normal) < 0;
+        return other.distance < depth && dot(other.normal, gaps[k].normal) < facing;
       });
       if (faced) deepest = {depth, i, step.owners[k]};
     }

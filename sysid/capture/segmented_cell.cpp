@@ -28,7 +28,7 @@ void save_segmented_cell(const SegmentedCell& cell, const std::string& path) {
       cell.trajectory.empty() ? Json(nullptr) : Json(data::relative_path(cell.trajectory, path));
   json["cameras"] = Json::array();
   for (const Eigen::Vector3d& camera : cell.cameras) json["cameras"].push_back(numbers(camera));
-  data::write_atomically(path, data::format_json(json) + "\n");
+  data::write_atomically(path, data::format_json(json));
 }
 
 SegmentedCell load_segmented_cell(const std::string& path) {
@@ -69,7 +69,9 @@ std::string segmented_cell_of(const std::string& clouds) {
   // A name that other tools have too: theirs is none of ours.
   std::error_code unknown;
   if (!fs::is_regular_file(file, unknown)) return "";
-  return data::read_file(file.string()).find(kSchema) == std::string::npos ? "" : file.string();
+  const nlohmann::json json = nlohmann::json::parse(data::read_file(file.string()), nullptr, false);
+  if (!json.is_object() || !json.contains("schema") || !json["schema"].is_string()) return "";
+  return json["schema"].get<std::string>().starts_with("flash-segment/") ? file.string() : "";
 }
 
 double height_under(const SegmentedCell::Table& table, const Eigen::Vector3d& point) {

@@ -27,8 +27,10 @@ double kept_steps(const Replay& replay) {
 /// The candidate that bends most easily.
 ReplayCandidate limpest(const GridSettings& settings) {
   std::vector<double> values;
-  for (const Axis& axis : settings.axes)
-    values.push_back(*std::min_element(axis.values.begin(), axis.values.end()));
+  for (const Axis& axis : settings.axes) {
+    const auto [least, most] = std::minmax_element(axis.values.begin(), axis.values.end());
+    values.push_back(axis.name == "areal_density" ? *most : *least);
+  }
   return candidate_at(values, settings);
 }
 

@@ -98,13 +98,20 @@ bool is_of_sheet(const KnownError& error) {
          error.name == unsettled_sheet_cells;
 }
 
-/// Those that is_of_sheet; none where half of the cells diverge.
-Errors errors_of_sheet(const Task& task, const std::vector<double>& values) {
+/// The cells halved, and where they are coarse halved again.
+std::vector<HalvedSheet> sheets_at(const Task& task, const std::vector<double>& values) {
+  std::vector<HalvedSheet> sheets = {halved_sheet(task.replays, 1)};
+  if (are_coarse(task, values)) sheets.push_back(halved_sheet(task.replays, 2));
+  return sheets;
+}
+
+/// Those that is_of_sheet, by sheets_at; none where half of the cells diverge.
+Errors errors_of_sheet(const Task& task, const std::vector<HalvedSheet>& sheets,
+                       const std::vector<double>& values) {
   Errors errors;
-  const Halving first = halving_at(task, halved_sheet(task.replays, 1), values);
+  const Halving first = halving_at(task, sheets.front(), values);
   if (!first) return errors;
-  const Halving second =
-      are_coarse(task, values) ? halving_at(task, halved_sheet(task.replays, 2), values) : Halving{};
+  const Halving second = sheets.size() > 1 ? halving_at(task, sheets[1], values) : Halving{};
   if (!second) {
     errors.push_back(error_of(half_sheet_cells, first.before, first.after, true, 1 + beyond(kSecondOrder)));
   } else {
@@ -138,9 +145,10 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
                                         const std::vector<double>& values,
                                         const std::vector<ReplayResult>& here) {
   if (!has_other_cells(task)) return {};
-  Errors errors = errors_of_sheet(task, values);
+  const std::vector<HalvedSheet> sheets = sheets_at(task, values);
+  Errors errors = errors_of_sheet(task, sheets, values);
   if (emulator.share == own_mesh) return errors;
-  const Shared half = shared_motions(task, halved_sheet(task.replays, 1).before, values),
+  const Shared half = shared_motions(task, sheets.front().before, values),
                finer = shared_motions(task, replays_of(emulator), values);
   if (half && finer && observed_ratio({here, half->results}, {half->results, finer->results}) > most_ratio)
     errors.push_back(error_of(unsettled_cells, std::make_shared<const Motions>(Motions{task.replays, here}),
@@ -165,9 +173,9 @@ bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& e
 
 bool follow_with_cells(const Task& task, const std::vector<double>& values, std::vector<KnownError>& errors) {
   if (!has_other_cells(task) || !has(errors, half_sheet_cells)) return false;
-  const bool coarse_by_now = are_coarse(task, values) && !has(errors, quarter_sheet_cells);
-  std::vector<HalvedSheet> sheets = {halved_sheet(task.replays, 1)};
-  if (coarse_by_now) sheets.push_back(halved_sheet(task.replays, 2));
+  std::vector<HalvedSheet> sheets = sheets_at(task, values);
+  const bool coarse_by_now = sheets.size() > 1 && !has(errors, quarter_sheet_cells);
+  if (!coarse_by_now) sheets.resize(1);
   std::vector<WantedMotion> wanted;
   for (const HalvedSheet& sheet : sheets)
     for (const std::vector<Replay>* replays : {&sheet.before, &sheet.after})
@@ -175,7 +183,7 @@ bool follow_with_cells(const Task& task, const std::vector<double>& values, std:
   if (task.told) task.told({}, {-static_cast<int>(wanted.size()), 0});
   task.store.prepare(wanted);
   if (coarse_by_now) {
-    Errors there = errors_of_sheet(task, values);
+    Errors there = errors_of_sheet(task, sheets, values);
     if (there.empty()) return false;
     std::erase_if(errors, is_of_sheet);
     std::move(there.begin(), there.end(), std::back_inserter(errors));
@@ -204,8 +212,7 @@ std::vector<std::vector<Replay>> replays_of_solution(const Task& task, const std
   std::vector<std::vector<Replay>> all;
   if (task.settings.solver_check) all.push_back(with_step(task.replays, 0.25));
   if (!has_other_cells(task)) return all;
-  for (int times = 1; times <= (are_coarse(task, values) ? 2 : 1); ++times) {
-    HalvedSheet sheet = halved_sheet(task.replays, times);
+  for (HalvedSheet& sheet : sheets_at(task, values)) {
     all.push_back(std::move(sheet.before));
     all.push_back(std::move(sheet.after));
   }

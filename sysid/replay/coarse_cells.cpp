@@ -45,7 +45,7 @@ std::string coarse_cells_text(const CoarseCells& coarse) {
   const auto mm = [](double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; };
   return "cells of " + mm(coarse.cell) + " are coarse for a sheet that leaves the table in a fold of about " +
          mm(coarse.radius) +
-         ": friction and bending may be off by a few percent more than their intervals say. Search on cells "
+         ": friction and bending may be off by a few percent more than is said of them. Search on cells "
          "of " +
          mm(kMost * coarse.radius / kOfPattern);
 }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "data/asset_mesh.h"
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "sim/scene/sheet.h"

@@ -59,7 +59,10 @@ void save_overlay(const Overlay& overlay, const std::string& folder) {
     table += data::format_number(frame.t) + "," + data::format_number(frame.score) + "," +
              std::to_string(frame.cloud.rows()) + "\n";
   }
-  if (!overlay.start_picture.empty()) data::write_atomically(picture_path(folder), overlay.start_picture);
+  if (overlay.start_picture.empty())
+    std::filesystem::remove(picture_path(folder));  // of an earlier search
+  else
+    data::write_atomically(picture_path(folder), overlay.start_picture);
   data::write_atomically(table_path(folder), table);
 }
 

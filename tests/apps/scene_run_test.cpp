@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "data/asset.h"
+#include "data/asset_mesh.h"
 #include "data/mesh_io.h"
 #include "data/scene.h"
 #include "sim/scene/scene.h"

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
+#include "data/asset_mesh.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"

@@ -29,7 +29,15 @@ TEST(FrameFiles, AGapIsAStepFarLongerThanTheOthers) {
   EXPECT_EQ(gap_in_names({"10.png", "20.png", "30.png"}), "");  // one in ten was kept
   EXPECT_EQ(gap_in_names({"1.png", "3.png"}), "");
   EXPECT_EQ(gap_in_names({"start.png", "middle.png", "end.png"}), "");
+  EXPECT_EQ(gap_in_names({"frame.8.ply", "frame.9.ply", "frame.10.ply", "frame.11.ply"}), "");
+  // Clocks, with and without a date and milliseconds.
   EXPECT_EQ(gap_in_names({"20261128_155958.png", "20261128_155959.png", "20261128_160000.png"}), "");
+  EXPECT_EQ(gap_in_names({"155958.png", "155959.png", "160000.png"}), "");
+  EXPECT_EQ(gap_in_names({"20261128155959800.png", "20261128155959900.png", "20261128160000000.png"}), "");
+  EXPECT_EQ(gap_in_names({"20261128_155913.png", "20261128_155914.png", "20261128_155919.png"}),
+            "no frame between 20261128_155914.png and 20261128_155919.png");
+  EXPECT_EQ(gap_in_names({"20261128_000001.png", "20261128_000002.png", "20261128_000006.png"}),
+            "no frame between 20261128_000002.png and 20261128_000006.png");
   // Time stamps jitter.
   EXPECT_EQ(gap_in_names({"1764000000.000.png", "1764000000.093.png", "1764000000.205.png"}), "");
   EXPECT_EQ(gap_in_names({"1764000000.000.png", "1764000000.093.png", "1764000000.305.png"}),

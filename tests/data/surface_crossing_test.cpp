@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "data/error.h"
 #include "data/obstacle_mesh.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::data {
 namespace {
@@ -53,12 +53,7 @@ TriangleMesh pierced(int rings) {
 }
 
 std::string message_of(const TriangleMesh& mesh) {
-  try {
-    checked_obstacle_mesh(mesh, "ball.obj");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return input_error_of([&] { checked_obstacle_mesh(mesh, "ball.obj"); });
 }
 
 /// Whether a segment meets a triangle, by its barycentric coordinates.

@@ -8,10 +8,10 @@
 #include <set>
 #include <vector>
 
-#include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/weld.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::data {
 namespace {
@@ -48,12 +48,7 @@ TetMesh cubes(int nx, int ny, int nz, bool mirrored) {
 }
 
 std::string message_of(const TetMesh& mesh) {
-  try {
-    check_tet_mesh(mesh, "a.vtk");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return input_error_of([&] { check_tet_mesh(mesh, "a.vtk"); });
 }
 
 /// Each tetrahedron a body of its own.

@@ -190,12 +190,7 @@ def main():
         results = list(check_inputs_are_kept(options.calib, work))
         for check in (check_full_disk, check_arms, check_refusals):
             results += check(options.calib, work)
-    for holds, complaint in results:
-        if not holds:
-            print(complaint, flush=True)
-    wrong = sum(not holds for holds, _ in results)
-    print(f"{len(results) - wrong} of {len(results)} statements hold")
-    sys.exit(1 if wrong else 0)
+    sys.exit(program.conclude(results))
 
 
 if __name__ == "__main__":

@@ -18,6 +18,16 @@ def must(program, *words):
     return done
 
 
+def conclude(results):
+    """Prints what does not hold of (holds, complaint), and how much does; the exit status."""
+    for holds, complaint in results:
+        if not holds:
+            print(complaint, flush=True)
+    wrong = sum(not holds for holds, _ in results)
+    print(f"{len(results) - wrong} of {len(results)} statements hold")
+    return 1 if wrong else 0
+
+
 def synthesize(sysid, folder, *options):
     """An asset and a recording of it, a short corner lift."""
     folder.mkdir(parents=True, exist_ok=True)

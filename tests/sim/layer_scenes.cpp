@@ -57,6 +57,17 @@ Eigen::Vector2d on_hairpin(double along, double radius) {
 
 }  // namespace
 
+void bend_to_hairpin(double radius, data::Points& x) {
+  const double middle = 0.5 * x.col(0).maxCoeff(), half = 0.5 * std::numbers::pi * radius;
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    const double from = x(i, 0) - middle;
+    if (std::abs(from) < half)
+      x.row(i) << radius * std::cos(from / radius), x(i, 1), radius * std::sin(from / radius);
+    else
+      x.row(i) << half - std::abs(from), x(i, 1), from > 0 ? radius : -radius;
+  }
+}
+
 LayerScene pile(int count, const SelfContact& contact, double side, int cells) {
   std::vector<Sheet> sheets;
   for (int k = 0; k < count; ++k) sheets.push_back(square(side, cells + k % 2, cells));

@@ -27,6 +27,10 @@ struct BlockMeshes {
 LayerScene block_on_incline(double slope, const SelfContact& contact, bool sheet_between,
                             const BlockMeshes& meshes = {});
 
+/// Bends a flat sheet that begins at x = 0 about its middle to a U of this radius [m], which opens towards
+/// -x.
+void bend_to_hairpin(double radius, data::Points& x);
+
 /// A sheet bent to a U whose legs fly at each other at `speed` [m/s].
 LayerScene thrown(const SelfContact& contact, double speed);
 

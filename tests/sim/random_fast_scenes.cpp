@@ -8,6 +8,7 @@
 
 #include "data/procedural_mesh.h"
 #include "tests/sim/brute_passing.h"
+#include "tests/sim/layer_scenes.h"
 #include "tests/sim/lot.h"
 #include "tests/sim/scene_findings.h"
 #include "tests/sim/sheet_scene.h"
@@ -116,17 +117,6 @@ void turn_world(Lot& lot, RandomFastScene& scene) {
   State& state = scene.environment.state;
   state.positions = (state.positions * by.transpose()).eval();
   state.velocities = (state.velocities * by.transpose()).eval();
-}
-
-void bend_to_hairpin(double radius, Points& x) {
-  const double middle = 0.5 * x.col(0).maxCoeff(), half = 0.5 * std::numbers::pi * radius;
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    const double from = x(i, 0) - middle;
-    if (std::abs(from) < half)
-      x.row(i) << radius * std::cos(from / radius), x(i, 1), radius * std::sin(from / radius);
-    else
-      x.row(i) << half - std::abs(from), x(i, 1), from > 0 ? radius : -radius;
-  }
 }
 
 Meeting draw(Lot& lot, double speed, RandomFastScene& scene) {

@@ -7,6 +7,7 @@
 
 #include "data/procedural_mesh.h"
 #include "sim/pairs/intersection.h"
+#include "tests/sim/layer_scenes.h"
 #include "tests/sim/lot.h"
 #include "tests/sim/sheet_scene.h"
 #include "tests/sim/solid_scene.h"
@@ -104,18 +105,6 @@ void stack(Lot& lot, double side, double fastest, RandomLayerScene& scene) {
   }
 }
 
-void bend_to_hairpin(double radius, RandomLayerScene& scene) {
-  Points& x = scene.environment.state.positions;
-  const double middle = 0.5 * x.col(0).maxCoeff(), half = 0.5 * std::numbers::pi * radius;
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    const double from = x(i, 0) - middle;
-    if (std::abs(from) < half)
-      x.row(i) << radius * std::cos(from / radius), x(i, 1), radius * std::sin(from / radius);
-    else
-      x.row(i) << half - std::abs(from), x(i, 1), from > 0 ? radius : -radius;
-  }
-}
-
 /// Rolls the sheet up to a scroll, whose turns are `apart`.
 void roll_up(double first_radius, double apart, RandomLayerScene& scene) {
   Points& x = scene.environment.state.positions;
@@ -152,7 +141,7 @@ void draw(Lot& lot, double fastest, RandomLayerScene& scene) {
     }
     case LayerSceneKind::thrown: {
       set_up(lot, draw_sheet(lot, side), scene);
-      bend_to_hairpin(side * lot.uniform(0.05, 0.12), scene);
+      bend_to_hairpin(side * lot.uniform(0.05, 0.12), scene.environment.state.positions);
       const double speed = fastest * lot.log_uniform(0.05, 1);
       for (Eigen::Index i = 0; i < environment.state.positions.rows(); ++i)
         environment.state.velocities(i, 2) = environment.state.positions(i, 2) > 0 ? -speed : speed;

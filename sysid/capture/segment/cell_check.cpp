@@ -40,7 +40,7 @@ std::string cell_fault(const std::vector<CellFrame>& frames, const std::optional
   // What lies on the table, or was let go of, is in few frames.
   std::sort(distances.rbegin(), distances.rend());
   const std::size_t most = (3 * frames.size() + 3) / 4;
-  if (distances.size() < most || distances[most - 1] < kFar) return "";
+  if (most == 0 || distances.size() < most || distances[most - 1] < kFar) return "";
   return "the gripper is " + metres(distances[most - 1]) +
          " or more from the nearest point that is seen in three of four frames, and cloth hangs on it (or "
          "does the "

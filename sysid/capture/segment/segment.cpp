@@ -56,6 +56,7 @@ bool inside(const ArmCylinder& arm, const Eigen::Vector3d& up, const Eigen::Vect
 bool is_background(const data::Points& points, const std::vector<int>& cluster, const ArmCylinder& arm,
                    const std::set<StillCell>& still) {
   constexpr double kFar = 0.15;  // from what the gripper holds [m]
+  if (still.empty()) return false;
   std::size_t at_rest = 0;
   double nearest = INFINITY;
   for (const int row : cluster) {

@@ -218,8 +218,8 @@ double size_of(const SheetPlan& plan) {
 /// step in halves is another discretization, and at a threshold rounding decides whether it is halved, or
 /// whether the way out of an obstacle is given up after as many iterations as there may be.
 std::size_t common_steps(const Trajectory& a, const Trajectory& b) {
-  constexpr int most_iterations = SolverSettings{}.max_iterations;
-  const auto alike = [](const ReplayStep& s, const ReplayStep& t) {
+  const int most_iterations = SolverSettings{}.max_iterations;
+  const auto alike = [most_iterations](const ReplayStep& s, const ReplayStep& t) {
     return s.substeps == t.substeps && (s.iterations < most_iterations) == (t.iterations < most_iterations);
   };
   std::size_t count = 0;

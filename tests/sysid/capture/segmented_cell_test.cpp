@@ -26,8 +26,10 @@ TEST(SegmentedCell, IsReadAsItWasWritten) {
   EXPECT_EQ(segmented_cell_of(folder / "frames"), std::filesystem::weakly_canonical(path).string());
   EXPECT_EQ(segmented_cell_of(folder / "some/frames"), "");
 
-  folder.write("segment.json", R"({"annotations": []})");
-  EXPECT_EQ(segmented_cell_of(folder / "frames"), "");
+  for (const char* foreign : {R"({"annotations": []})", R"({"note": "flash-segment/1"})", "[", ""}) {
+    folder.write("segment.json", foreign);
+    EXPECT_EQ(segmented_cell_of(folder / "frames"), "") << foreign;
+  }
   save_segmented_cell({}, path);
   EXPECT_FALSE(load_segmented_cell(path).table);
   EXPECT_EQ(load_segmented_cell(path).trajectory, "");

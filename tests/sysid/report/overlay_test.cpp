@@ -22,6 +22,9 @@ TEST(Overlay, ComesBackFromItsFolder) {
   const Overlay loaded = load_overlay(folder / "lift");
   EXPECT_EQ(loaded.name, "lift");
   EXPECT_EQ(loaded.start_picture, "<svg/>");
+  overlay.start_picture = "";
+  save_overlay(overlay, folder / "lift");
+  EXPECT_EQ(load_overlay(folder / "lift").start_picture, "");
   EXPECT_EQ(loaded.triangles, overlay.triangles);
   ASSERT_EQ(loaded.frames.size(), 2u);
   EXPECT_EQ(loaded.frames[0].t, 0.5);
