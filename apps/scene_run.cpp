@@ -387,7 +387,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   write_tables();
   if (nearest < no_layers) summary.layer_distance_min = nearest;
   summary.warnings = seam_warnings(bodies);
-  for (const std::string& warning : locking_warnings(bodies)) summary.warnings.push_back(warning);
+  for (const std::string& warning : stiff_mesh_warnings(bodies)) summary.warnings.push_back(warning);
   for (const auto& [solid, worst] : collapses)
     if (worst.elements > 0)
       summary.warnings.push_back(collapse_warning(bodies[solid.first], solid.second, worst));

@@ -1,24 +1,30 @@
 #include "apps/scene_warnings.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "data/seams.h"
 #include "data/text.h"
+#include "sim/scene/bending_excess.h"
 #include "sim/scene/solid.h"
 
 namespace flash::sim {
 
-std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) {
+std::vector<std::string> stiff_mesh_warnings(const std::vector<SceneBody>& bodies) {
+  constexpr double told = 0.1, slender = 2;
   std::vector<std::string> warnings;
-  for (const SceneBody& body : bodies)
-    for (const auto& [number, solid] : body.environment.solids)
-      if (solid.poissons_ratio >= locking_poissons_ratio &&
-          !is_quadratic(body.sheet, body.sheet.bodies[static_cast<std::size_t>(number)]))
-        warnings.push_back(body.name +
-                           ": linear tetrahedra lock at nu = " + data::format_short(solid.poissons_ratio) +
-                           ", from " + data::format_short(locking_poissons_ratio) +
-                           " on: bent, they are stiffer than their E says, the more the coarser; take "
-                           "\"element_order\": 2 in the asset (docs/theory.md)");
+  for (const SceneBody& in : bodies)
+    for (const auto& [number, solid] : in.environment.solids) {
+      const Body& body = in.sheet.bodies[static_cast<std::size_t>(number)];
+      const double excess = bending_excess(in.sheet, body, solid.constitutive, solid.poissons_ratio);
+      const double locking = excess - bending_excess(in.sheet, body, solid.constitutive, 0);
+      if (excess < told || (locking < told && slenderness(in.sheet, body) < slender)) continue;
+      warnings.push_back((body.name.empty() ? in.name : body.name) +
+                         ": bent, its linear tetrahedra are up to " +
+                         data::format_short(std::ceil(100 * excess)) +
+                         " % stiffer than their E says; take \"element_order\": 2 in the asset, or smaller "
+                         "cells (docs/theory.md, Locking)");
+    }
   return warnings;
 }
 

@@ -8,8 +8,9 @@
 
 namespace flash::sim {
 
-/// Of bodies whose mesh is stiffer than their material.
-std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies);
+/// Of solids whose mesh is stiffer in bending than their material by a tenth or more: of those at least twice
+/// as long as thick, which bend, and of all where Poisson's ratio adds as much.
+std::vector<std::string> stiff_mesh_warnings(const std::vector<SceneBody>& bodies);
 
 /// Of sheets with vertices in one place that are not joined.
 std::vector<std::string> seam_warnings(const std::vector<SceneBody>& bodies);

@@ -30,10 +30,6 @@ data::Points with_midsides(const Sheet& sheet, const data::Points& positions);
 /// `vertices` and those in the middle of edges between two of them.
 std::vector<int> with_midsides(const Sheet& sheet, std::vector<int> vertices);
 
-/// Poisson's ratio from which linear tetrahedra are too stiff by far: they lock, as each keeps its volume by
-/// itself (docs/theory.md).
-inline constexpr double locking_poissons_ratio = 0.4;
-
 /// The first tetrahedron that `positions` turn inside out or flatten; -1: none.
 int first_inverted(const Sheet& sheet, const data::Points& positions);
 

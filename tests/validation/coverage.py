@@ -305,6 +305,18 @@ def print_wrong(kind, twins):
               " ".join(f"{cell:>24}" for cell in cells))
 
 
+def read_rows(paths):
+    """Twins of earlier calls, and the Cramer-Rao widths of their seeds."""
+    twins, bounds = [], {}
+    for path in paths:
+        for row in json.loads(path.read_text()):
+            bound = row.pop("bounds")
+            twins.append(row)
+            if bound is not None:
+                bounds[row["seed"]] = bound
+    return twins, bounds
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sysid", required=True, help="the program flash-sysid")
@@ -317,15 +329,19 @@ def main():
     parser.add_argument("--jobs", type=int, default=2, help="searches at a time; the same command again goes on where it stopped")
     parser.add_argument("--threads", type=int, help="of each search; without it, as many as there are processors")
     parser.add_argument("--minutes", type=float, help="after which no search is begun: the tables are of what was done by then")
+    parser.add_argument("--rows", nargs="+", type=pathlib.Path, default=[], metavar="FILE",
+                        help="coverage.json of earlier calls of the kind: the tables are of their twins, too; with --runs 0, of them alone")
     options = parser.parse_args()
     kind = KINDS[options.kind]
+    earlier, bounds = read_rows(options.rows)
     runs = kept.Runs(options.sysid, options.out, options.threads)
     asset = synthetic.write_asset(options.out, **kind.properties)
     seeds = range(options.seed, options.seed + options.runs)
     jobs = [(seed, None) for seed in seeds] + [(seed, kind.wrong[i % len(kind.wrong)]) for i, seed in enumerate(seeds)]
-    jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair]
+    known = [(twin["seed"], twin["wrong"]) for twin in earlier]
+    jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair if job not in known]
     begin = time.monotonic()
-    first = 0 if kind.rates else 1  # sheets of one size share motions: the first search fills the store
+    first = 0 if kind.rates else min(1, len(jobs))  # sheets of one size share motions: the first search fills the store
     found = [searched(kept.Runs(options.sysid, options.out), asset, kind, *job) for job in jobs[:first]]
 
     def done(job):
@@ -335,7 +351,6 @@ def main():
 
     bounded = seeds[:options.bounds if kind.bound_with is not None else 0]
     left = None if options.minutes is None else options.minutes - (time.monotonic() - begin) / 60
-    bounds = {}
     # What an earlier call finished counts however little time there is.
     finished = [job for job in jobs[first:] if (options.out / run_name(*job) / "summary.json").exists()]
     others = [job for job in jobs[first:] if job not in finished]
@@ -346,10 +361,11 @@ def main():
                 bounds[twin["seed"]] = bound
     if first and found[0]["seed"] in bounded:
         bounds[found[0]["seed"]] = least_spread(runs, kind, found[0])
+    found += earlier
     rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
             for twin in sorted(found, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]
     (options.out / "coverage.json").write_text(json.dumps(rows, indent=1))
-    print(f"\n{options.kind}, seeds {seeds.start} to {seeds.stop - 1}, {len(found)} of {len(jobs)} searched")
+    print(f"\n{options.kind}, seeds {rows[0]['seed']} to {rows[-1]['seed']}, {len(rows)} of {len(jobs) + len(earlier)} searched")
     print_right(kind, [twin for twin in found if not twin["wrong"]], bounds)
     print_wrong(kind, [twin for twin in found if twin["wrong"]])
     return 0
