@@ -30,11 +30,11 @@ help:  ## This list
 
 demo: configure  ## Packages, build, then the main job on depth frames it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
-	$(sysid) synth --asset examples/towel.json --mesh sheet:0.3x0.3:0.01 --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
+	$(sysid) synth --asset examples/assets/towel.json --mesh sheet:0.3x0.3:0.01 --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
 	$(sysid) segment $(DEMO)/recording/camera1 --trajectory $(DEMO)/recording/gripper.tum --times rate:10 --force -o $(DEMO)/segmented
 	$(sysid) import $(DEMO)/segmented/frames --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 \
 	  --crop-z 0.008: --offset-bound 0.005 --force -o $(DEMO)/lift
-	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 \
+	$(sysid) grid $(DEMO)/lift --asset examples/assets/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 \
 	  --hold areal_density=0.2:measured --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
@@ -143,7 +143,7 @@ contact-counts: configure-test  ## Say how many iterations a step takes as conta
 
 scene-batch: configure-test  ## Say how long steps of the T-shirt take in 1, 64 and 256 environments, on two threads
 	cmake --build $(BUILD) -j $(JOBS) --target scene_batch_study
-	$(BUILD)/tests/scene_batch_study examples/tshirt_fold.json 2 1 30 64 1 256 1
+	$(BUILD)/tests/scene_batch_study examples/scenes/tshirt_fold.json 2 1 30 64 1 256 1
 
 silicone: build packages-test  ## Say what E silicone parts that sag have by clouds of a lidar, from $(DATA)/silicone
 	$(PYTHON) tests/validation/silicone.py --sysid $(sysid) --data $(DATA)/silicone --out $(BUILD)/silicone

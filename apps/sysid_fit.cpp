@@ -12,6 +12,7 @@
 #include "data/writable.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
+#include "sysid/emulate/search_warnings.h"
 #include "sysid/replay/half_cell.h"
 #include "sysid/report/fit_start.h"
 
@@ -128,17 +129,24 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   sysid::check_job(replays, sysid::count_candidates(grid.axes),
                    sysid::estimate_memory(replays, grid, asked.solver_check));
   for (const std::string& notice : notices) say(options.common, notice);
+  tell_known_before(options.common, replays, sysid::held_at(start.values, grid));
   // Before the long part. Axes, which that part finds, are not compared.
   for (const std::string& line : other_settings(options.start, sysid::fingerprint(replays, grid))) warn(line);
   asked.ranges = grid.axes;
   const std::string grid_file = (fs::path(options.out) / "grid.json").string();
+  double candidate_seconds = 0;
   if (options.resume && fs::exists(grid_file)) {
     grid.axes = sysid::load_grid_file(grid_file).axes;  // the fingerprint holds the rest to it
   } else {
-    AnswerLine line(options.common, sysid::most_design_work(grid, replays.size()));
+    // The first lattice has all errors of the solution; the answer is by motions that are kept then.
+    sysid::ExpectedWork expected = sysid::expected_work(replays, grid, asked.solver_check);
+    expected.end += expected.first_look;
+    AnswerLine line(options.common, sysid::most_design_work(grid, replays.size()), sysid::TimeLeft(expected),
+                    sysid::SearchStage::candidates);
     grid.axes = sysid::design_about(
         replays, grid, start.values, start.around, asked,
         [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
+    candidate_seconds = line.time().seconds_each().value_or(0);
   }
   end_after_signal();
   const sysid::Fingerprint print = sysid::fingerprint(replays, grid);
@@ -148,6 +156,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
                                                    : sysid::Existing::refuse);
   Search search{asset, std::move(replays), grid, asked, {}, options.out, begin};
   search.plan = !options.no_plan;
+  search.candidate_seconds = candidate_seconds;
   return run_search(search, store, options.common);
 }
 

@@ -23,6 +23,7 @@
 #include "data/text.h"
 #include "data/writable.h"
 #include "sim/scene/sheet.h"
+#include "sysid/emulate/search_warnings.h"
 #include "sysid/report/recording_names.h"
 
 namespace flash {
@@ -307,6 +308,13 @@ void warn_of_seams(const data::Recording& recording) {
   if (!seams.empty()) warn(recording.name + ": " + recording.mesh_spec + ": " + seams);
 }
 
+void tell_known_before(const CommonOptions& options, const std::vector<sysid::Replay>& replays,
+                       const sysid::GridSettings& settings) {
+  const sysid::KnownBefore known = sysid::known_before(replays, settings);
+  for (const std::string& warning : known.warnings) warn(warning);
+  for (const std::string& notice : known.notices) say(options, notice);
+}
+
 int thread_count(const CommonOptions& options) {
   return options.threads > 0 ? options.threads
                              : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -417,6 +425,12 @@ sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sh
   return base;
 }
 
+namespace {
+
+std::string left_text(double seconds) { return "about " + duration_text(seconds) + " left"; }
+
+}  // namespace
+
 ProgressLine::ProgressLine(const CommonOptions& options)
     : visible_(!options.quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
 
@@ -424,35 +438,37 @@ ProgressLine::~ProgressLine() {
   if (drawn_) std::cerr << '\n';
 }
 
-bool ProgressLine::due(int done, int total) {
+/// `share`: of the way.
+bool ProgressLine::due(double share) {
   if (!visible_) return false;
-  if (terminal_ || done == total) return true;
-  const int tenths = static_cast<int>(10.0 * done / std::max(1, total));
+  if (terminal_ || share >= 1) return true;
+  const int tenths = static_cast<int>(10 * share);
   const double since = std::chrono::duration<double>(Clock::now() - last_).count();
   if (since < 30 && (tenths == tenths_ || since < 1)) return false;
   tenths_ = tenths;
   return true;
 }
 
-void ProgressLine::show(const sysid::Progress& progress) {
-  if (!due(progress.done, progress.total)) return;
+void ProgressLine::show(const sysid::Progress& progress, std::optional<double> seconds_left) {
+  if (!due(static_cast<double>(progress.done) / std::max(1, progress.total))) return;
   char line[160];
-  std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, %s left, best %.2f mm", progress.done,
-                progress.total, progress.candidates_per_second, duration_text(progress.seconds_left).c_str(),
-                1000 * progress.best_score);
+  std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, best %.2f mm%s", progress.done,
+                progress.total, progress.candidates_per_second, 1000 * progress.best_score,
+                seconds_left ? (", with the answer " + left_text(*seconds_left)).c_str() : "");
   draw(line);
 }
 
-void ProgressLine::show(const sysid::AnswerMeter& meter) {
-  const auto [done, most] = std::pair(meter.done(), meter.most());
-  if (!due(done.motions + done.scores, most.motions + most.scores)) return;
+void ProgressLine::show(const sysid::AnswerMeter& meter, std::optional<double> seconds_left) {
+  const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
+  // Below 1: what is expected is never over.
+  if (!due(seconds_left ? elapsed / (elapsed + std::max(*seconds_left, 1e-3)) : 0)) return;
   const auto part = [](int count, int of, const std::string& what) {
     return data::format_count(static_cast<std::size_t>(count)) + " of at most " +
            data::format_count(static_cast<std::size_t>(of)) + what;
   };
-  draw("the answer: " + part(done.motions, most.motions, " motions, ") +
-       part(done.scores, most.scores, " scores between them, at most ") +
-       duration_text(meter.seconds_left()) + " left" + (done.scores == 0 ? " and the scores" : ""));
+  draw("the answer: " + part(meter.done().motions, meter.most().motions, " motions, ") +
+       part(meter.done().scores, meter.most().scores, " scores between them") +
+       (seconds_left ? ", " + left_text(*seconds_left) : ""));
 }
 
 void ProgressLine::draw(const std::string& line) {

@@ -19,6 +19,7 @@
 #include "sysid/design/rank_experiments.h"
 #include "sysid/design/usual_ranges.h"
 #include "sysid/design/virtual_experiment.h"
+#include "sysid/emulate/search_warnings.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/parameter_label.h"
 #include "sysid/report/plan_start.h"
@@ -162,6 +163,7 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   for (const data::Recording& recording : recordings) {
     const std::vector<sysid::Replay> replays = {
         sysid::make_replay(data::load_recording(recording.source), replay)};
+    tell_known_before(options.common, replays, sysid::held_at(settings.at, settings.grid));
     const std::size_t batch = 2 * settings.at.size() + 1;
     sysid::check_job(replays, static_cast<double>(batch), sysid::estimate_batch(replays, batch));
     experiments.push_back(sysid::plan_experiment(recording.name, replays, settings, kept));

@@ -16,6 +16,7 @@
 #include "data/recording_digest.h"
 #include "data/text.h"
 #include "data/writable.h"
+#include "sysid/emulate/search_warnings.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/prediction.h"
 #include "sysid/observe/registration_parameter.h"
@@ -195,6 +196,7 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
     if (used.sha256 == data::recording_sha256(recording))
       warn(recording.name + " is a recording that the search used: nothing is predicted");
   for (const std::string& warning : found.summary.warnings) say(options.common, "the search: " + warning);
+  tell_known_before(options.common, replays, sysid::held_at(found.values.front(), found.grid));
 
   std::vector<sysid::ReplayCandidate> candidates;
   for (std::size_t i = 0; i < found.values.size(); ++i)

@@ -27,6 +27,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+double seconds_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 // `by_points`: the interval tells all, and the estimate no more than the others within it.
 std::string value_text(const sysid::ParameterFinding& finding, const std::string& unit, bool by_points) {
   const auto text = [&](double value) {
@@ -165,11 +169,13 @@ std::vector<sysid::NextExperiment> next_experiments(const Search& search, const 
 }
 
 // Judges what was found and writes the answer.
-int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptions& options) {
+int conclude(Search& search, const sysid::ResultsStore& store, const sysid::TimeLeft& time,
+             const CommonOptions& options) {
   sysid::GridResults results = store.results();
   const sysid::Answer answer = [&] {
     AnswerLine line(options,
-                    sysid::most_work(search.settings, search.replays.size(), search.asked.solver_check));
+                    sysid::most_work(search.settings, search.replays.size(), search.asked.solver_check), time,
+                    sysid::SearchStage::first_look);
     return sysid::find_answer(
         results, search.replays, search.settings, search.asked,
         [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
@@ -209,21 +215,30 @@ int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptio
 
 }  // namespace
 
+AnswerLine::AnswerLine(const CommonOptions& options, const sysid::AnswerWork& most,
+                       const sysid::TimeLeft& time, sysid::SearchStage stage)
+    : line_(options), meter_(most), time_(time) {
+  time_.begin(stage, seconds_now());
+}
+
 void AnswerLine::take(const sysid::AnswerWork& done, const sysid::AnswerWork& spared) {
   const std::scoped_lock lock(mutex_);
-  const auto now = std::chrono::steady_clock::now();
-  meter_.take(done, spared, std::chrono::duration<double>(now - last_).count());
-  last_ = now;
-  line_.show(meter_);
+  const double now = seconds_now();
+  meter_.take(done, spared);
+  if (done.lattices > 0) time_.begin(sysid::SearchStage::lattice, now);
+  if (done.ends > 0) time_.begin(sysid::SearchStage::end, now);
+  line_.show(meter_, time_.seconds(now));
 }
 
 int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& options) {
   const auto total = static_cast<std::size_t>(sysid::count_candidates(search.settings.axes));
-  const sysid::AnswerWork most =
-      sysid::most_work(search.settings, search.replays.size(), search.asked.solver_check);
-  say(options, "then the answer: at most " + data::format_count(static_cast<std::size_t>(most.motions)) +
-                   " motions more and " + data::format_count(static_cast<std::size_t>(most.scores)) +
-                   " scores between them");
+  const sysid::ExpectedWork expected =
+      sysid::expected_work(search.replays, search.settings, search.asked.solver_check);
+  say(options, "then the answer, which takes about as long as " +
+                   data::format_count(static_cast<std::size_t>(
+                       expected.first_look + expected.lattices * expected.lattice + expected.end)) +
+                   " candidates more");
+  sysid::TimeLeft time(expected);
   const auto kept = [&](const std::string& why = {}) {
     warn(why + "stopped with " + data::format_count(store.results().candidates.size()) + " of " +
          data::format_count(total) + " candidates, kept in " + search.out + "; --resume goes on");
@@ -234,11 +249,16 @@ int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& 
       ProgressLine line(options);
       if (!sysid::grid_search(
               search.replays, search.settings, store,
-              [&](const sysid::Progress& progress) { line.show(progress); }, &stop_on_signals()))
+              [&](const sysid::Progress& progress) {
+                time.take_candidates(progress.total - progress.done,
+                                     std::max(1 / progress.candidates_per_second, search.candidate_seconds));
+                line.show(progress, time.seconds(0));
+              },
+              &stop_on_signals()))
         return kept();
     }
     if (options.verbose) tell_what_was_shared(search.replays, options);
-    return conclude(search, store, options);
+    return conclude(search, store, time, options);
   } catch (const data::Stopped&) {
     return kept();
   } catch (const sim::DeviceError& error) {

@@ -8,6 +8,7 @@
 #include "data/asset.h"
 #include "sysid/emulate/results_store.h"
 #include "sysid/infer/answer.h"
+#include "sysid/infer/time_left.h"
 #include "sysid/replay/replay.h"
 
 namespace flash {
@@ -21,20 +22,24 @@ struct Search {
   std::vector<std::string> map;  ///< the two parameters of the report's score map; empty: chosen
   std::string out;
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
-  bool plan = true;  ///< say what to record next
+  bool plan = true;              ///< say what to record next
+  double candidate_seconds = 0;  ///< that one takes at least, kept motions apart; 0: not known
 };
 
 /// Shows how far an answer is, told by any thread.
 class AnswerLine {
  public:
-  AnswerLine(const CommonOptions& options, const sysid::AnswerWork& most) : line_(options), meter_(most) {}
+  /// `stage`: in which the work begins; candidates where lattices follow at once.
+  AnswerLine(const CommonOptions& options, const sysid::AnswerWork& most, const sysid::TimeLeft& time,
+             sysid::SearchStage stage);
   void take(const sysid::AnswerWork& done, const sysid::AnswerWork& spared);
+  const sysid::TimeLeft& time() const { return time_; }
 
  private:
   std::mutex mutex_;
   ProgressLine line_;
   sysid::AnswerMeter meter_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  sysid::TimeLeft time_;
 };
 
 /// Simulates what `store` does not hold yet, finds the answer and writes it: summary.json, report.html and

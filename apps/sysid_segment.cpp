@@ -205,7 +205,7 @@ void add_segment_verb(CLI::App& app, Action& action) {
               "Height of a level table in the base frame [m]; without it one is sought, beyond the crop too")
           ->check(number_between(-20, 20));
   verb->add_flag("--no-table", options->no_table, "There is no table in view")->excludes(height);
-  verb->add_option("-o,--out", options->out, "Folder for frames/ and segment.png")->required();
+  verb->add_option("-o,--out", options->out, "Folder for frames/ and segment.svg")->required();
   add_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
       "Example:\n  flash-sysid segment raw/camera --trajectory gripper.tum --times rate:10 -o segmented");

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "data/asset_units.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -171,6 +172,15 @@ ElementOrder read_element_order(const JsonObject& file, ElementType type) {
   return order == 2 ? ElementOrder::quadratic : ElementOrder::linear;
 }
 
+/// What a search says of the asset, as text; the units beside that are checked and belong to the file.
+std::string read_identification(const JsonObject& identification, const Asset& asset) {
+  nlohmann::json text = identification.value();
+  if (asset.format == AssetFormat::published || !text.contains("units")) return text.dump();
+  check_units(identification.object("units"), asset);
+  text.erase("units");
+  return text.empty() ? "" : text.dump();
+}
+
 nlohmann::ordered_json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 double areal_density_of(const Asset& asset, double rest_area) {
@@ -245,7 +255,8 @@ Asset load_asset(const std::string& path) {
     asset.rotation_degrees = transformation.vector3("rotation", asset.rotation_degrees);
   }
   read_properties(file.object("mechanical_props"), asset);
-  if (file.has("identification")) asset.identification = file.object("identification").value().dump();
+  if (file.has("identification"))
+    asset.identification = read_identification(file.object("identification"), asset);
   return asset;
 }
 
@@ -285,8 +296,15 @@ void save_asset(const Asset& asset, const std::string& path) {
     if (asset.stiffness_damping != 0) props["stiffness_damping"] = asset.stiffness_damping;
   }
   file["mechanical_props"] = props;
-  if (!published && !asset.identification.empty())
-    file["identification"] = nlohmann::ordered_json::parse(asset.identification);
+  if (!published) {
+    nlohmann::ordered_json& identification = file["identification"];
+    if (!asset.identification.empty()) identification = nlohmann::ordered_json::parse(asset.identification);
+    nlohmann::ordered_json numbers = props;
+    numbers.update(file["transformation"]);
+    if (identification.contains("estimate") && identification["estimate"].is_object())
+      numbers.update(identification["estimate"]);
+    identification["units"] = units_of(numbers, asset);
+  }
   write_atomically(path, format_json(file));
 }
 

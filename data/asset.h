@@ -41,7 +41,7 @@ struct Asset {
   double friction = 0.3;
   double air_drag = 0.0;           ///< [1/s]
   double stiffness_damping = 0.0;  ///< [s]
-  std::string identification;      ///< raw JSON text of `identification`, empty when absent
+  std::string identification;      ///< raw JSON text of `identification` without `units`, empty when absent
 };
 
 /// Throws InputError on unknown fields (naming the nearest known one), on values out of range and on anything

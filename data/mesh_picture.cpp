@@ -15,6 +15,8 @@ using Eigen::Vector3d;
 constexpr int oversampling = 3;        // drawn larger, then averaged: smooth edges
 constexpr double border = 0.04;        // of the picture, left free on each side
 constexpr double crease_cosine = 0.7;  // between triangles that are shaded as one round surface
+constexpr double lying =
+    1e-3;  // of the picture: what lies so near on another mesh hides it, if it is named first
 
 /// What the eye sees: right, down, and away from it.
 Eigen::Matrix3d view_of(const MeshPictureSettings& settings) {
@@ -56,12 +58,14 @@ std::vector<std::array<Vector3d, 3>> shading_normals(const TriangleMesh& mesh) {
   return normals;
 }
 
-/// A large picture with the distance of what each pixel shows.
+/// A large picture with the distance of what each pixel shows, and the number of its mesh.
 struct Canvas {
   Picture picture;
   std::vector<double> depth;
+  std::vector<std::size_t> shown;
   Eigen::Matrix3d view;
   double scale;            ///< [px/m]
+  double slack = 0;        ///< by which a later mesh has to be nearer [m]
   Eigen::Vector2d offset;  ///< [px]
 
   Vector3d seen(const Vector3d& place) const {
@@ -70,8 +74,9 @@ struct Canvas {
   }
 };
 
+/// `number`: of its mesh.
 void draw_triangle(Canvas& canvas, const std::array<Vector3d, 3>& corners,
-                   const std::array<Vector3d, 3>& normals, const Colour& colour) {
+                   const std::array<Vector3d, 3>& normals, const Colour& colour, std::size_t number) {
   const Vector3d a = canvas.seen(corners[0]), b = canvas.seen(corners[1]), c = canvas.seen(corners[2]);
   const double area = (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
   if (area == 0) return;
@@ -86,9 +91,11 @@ void draw_triangle(Canvas& canvas, const std::array<Vector3d, 3>& corners,
                    of_c = ((b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x())) / area;
       if (of_b < 0 || of_c < 0 || of_b + of_c > 1) continue;
       const double depth = a.z() + of_b * (b.z() - a.z()) + of_c * (c.z() - a.z());
-      double& nearest = canvas.depth[static_cast<std::size_t>(v) * picture.width + u];
-      if (depth >= nearest) continue;
+      const std::size_t pixel = static_cast<std::size_t>(v) * picture.width + u;
+      double& nearest = canvas.depth[pixel];
+      if (depth >= nearest - (canvas.shown[pixel] == number ? 0 : canvas.slack)) continue;
       nearest = depth;
+      canvas.shown[pixel] = number;
       const Vector3d normal =
           ((1 - of_b - of_c) * normals[0] + of_b * normals[1] + of_c * normals[2]).normalized();
       // The side towards the eye is lit.
@@ -102,10 +109,13 @@ void draw_triangle(Canvas& canvas, const std::array<Vector3d, 3>& corners,
 Canvas make_canvas(const std::vector<PicturedMesh>& meshes, const MeshPictureSettings& settings) {
   Canvas canvas{Picture(oversampling * settings.width, oversampling * settings.height, {255, 255, 255}),
                 {},
+                {},
                 view_of(settings),
                 1,
+                0,
                 Eigen::Vector2d::Zero()};
   canvas.depth.assign(canvas.picture.pixels.size(), std::numeric_limits<double>::infinity());
+  canvas.shown.assign(canvas.picture.pixels.size(), 0);
   Eigen::AlignedBox2d bounds;
   for (const PicturedMesh& pictured : meshes)
     for (const auto& row : pictured.mesh.vertices.rowwise())
@@ -113,6 +123,7 @@ Canvas make_canvas(const std::vector<PicturedMesh>& meshes, const MeshPictureSet
   const Eigen::Vector2d size(canvas.picture.width, canvas.picture.height);
   if (bounds.isEmpty()) return canvas;
   canvas.scale = ((1 - 2 * border) * size.array() / bounds.sizes().array().max(1e-12)).minCoeff();
+  canvas.slack = lying * bounds.diagonal().norm();
   canvas.offset = 0.5 * size - canvas.scale * bounds.center();
   return canvas;
 }
@@ -121,14 +132,14 @@ Canvas make_canvas(const std::vector<PicturedMesh>& meshes, const MeshPictureSet
 
 Picture draw_meshes(const std::vector<PicturedMesh>& meshes, const MeshPictureSettings& settings) {
   Canvas canvas = make_canvas(meshes, settings);
-  for (const PicturedMesh& pictured : meshes) {
-    const TriangleMesh& mesh = pictured.mesh;
+  for (std::size_t number = 0; number < meshes.size(); ++number) {
+    const TriangleMesh& mesh = meshes[number].mesh;
     const auto normals = shading_normals(mesh);
     for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t) {
       std::array<Vector3d, 3> corners;
       for (int k = 0; k < 3; ++k)
         corners[static_cast<std::size_t>(k)] = mesh.vertices.row(mesh.triangles(t, k));
-      draw_triangle(canvas, corners, normals[static_cast<std::size_t>(t)], pictured.colour);
+      draw_triangle(canvas, corners, normals[static_cast<std::size_t>(t)], meshes[number].colour, number);
     }
   }
   Picture picture(settings.width, settings.height, {255, 255, 255});

@@ -19,7 +19,7 @@ struct MeshPictureSettings {
 };
 
 /// Meshes as a far eye sees them, z up, lit from the eye's upper left on both sides of each triangle. The
-/// picture is filled by what all of them take.
+/// picture is filled by what all of them take. Where one lies on another, the one that is named first shows.
 Picture draw_meshes(const std::vector<PicturedMesh>& meshes, const MeshPictureSettings& settings = {});
 
 }  // namespace flash::data

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "sysid/emulate/focused_axes.h"
+#include "sysid/emulate/search_warnings.h"
 #include "sysid/emulate/two_mesh_motions.h"
 #include "sysid/replay/coarse_cells.h"
 #include "sysid/replay/half_cell.h"
@@ -24,21 +25,11 @@ double kept_steps(const Replay& replay) {
   return static_cast<double>(std::count(read.begin(), read.end(), true));
 }
 
-/// The candidate that bends most easily.
-ReplayCandidate limpest(const GridSettings& settings) {
-  std::vector<double> values;
-  for (const Axis& axis : settings.axes) {
-    const auto [least, most] = std::minmax_element(axis.values.begin(), axis.values.end());
-    values.push_back(axis.name == "areal_density" ? *most : *least);
-  }
-  return candidate_at(values, settings);
-}
-
 /// Of the estimate on other cells of the sheet, which are in work side by side: those with half and, where
 /// cells may be coarse, a quarter of the cells [bytes].
 double other_cells_bytes(const std::vector<Replay>& replays, const GridSettings& settings) {
   std::vector<double> factors = {kFiner, 1};  // vertices of each, over those of the search's mesh
-  if (coarse_cells(replays, limpest(settings))) factors = {kFiner * kFiner, kFiner, kFiner, 1};
+  if (coarse_cells(replays, limpest_candidate(settings))) factors = {kFiner * kFiner, kFiner, kFiner, 1};
   double bytes = 0;
   int threads = settings.threads;
   for (const double factor : factors)

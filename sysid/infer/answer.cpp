@@ -207,6 +207,7 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
         return std::move(*own);
     keep_to_simulated(task, found, best, held);
   }
+  if (task.told) task.told({.ends = 1}, {});
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
   if (!unrefined.empty()) answer.warnings.push_back(unrefined);

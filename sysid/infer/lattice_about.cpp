@@ -108,6 +108,7 @@ std::optional<Found> look_about(const Task& task, const Extent& extent, const st
   const std::size_t most = many ? many_motions(task.ranges) : few_motions(task.ranges);
   const std::vector<Axis> axes = lattice(extent, task.ranges, many ? 4 : 3, most);
   if (cartesian_product(axes).size() > most) return std::nullopt;
+  if (task.told) task.told({.lattices = 1}, {});
   std::optional<Emulator> emulator = emulator_over(
       task, axes, finer ? thinned(lattice(extent, task.ranges, 2, most / 3)) : std::vector<Axis>{}, true);
   if (!emulator) return std::nullopt;

@@ -24,15 +24,26 @@ namespace {
 
 constexpr double kMost = 0.5;  // of the radius
 
+/// That bends the sheet over the edge of its fold, by area; 0 where there is none [N/m^2].
+double weight_on_table(const Replay& replay, const ReplayCandidate& candidate) {
+  return candidate.solid || !replay.recording.has_table
+             ? 0
+             : candidate.material.areal_density * replay.recording.gravity.norm();
+}
+
 }  // namespace
+
+double coarse_below(const Replay& replay, const ReplayCandidate& heaviest) {
+  const double weight = weight_on_table(replay, heaviest);
+  return weight > 0 ? weight * std::pow(typical_cell(replay.recording.mesh) / kMost, 3) : 0;
+}
 
 std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays,
                                         const ReplayCandidate& candidate) {
   const data::SheetMaterial& material = candidate.material;
   for (const Replay& replay : replays) {
-    const double weight = material.areal_density * replay.recording.gravity.norm();
-    if (candidate.solid || !replay.recording.has_table || !(weight > 0 && material.bending_rigidity > 0))
-      continue;
+    const double weight = weight_on_table(replay, candidate);
+    if (!(weight > 0 && material.bending_rigidity > 0)) continue;
     const CoarseCells cells = {typical_cell(replay.recording.mesh),
                                std::cbrt(material.bending_rigidity / weight)};
     if (cells.cell > kMost * cells.radius) return cells;

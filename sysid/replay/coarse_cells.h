@@ -24,6 +24,10 @@ struct CoarseCells {
 /// table, no weight, no bending or a solid.
 std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays, const ReplayCandidate& candidate);
 
+/// The bending rigidity below which cells of a recording are coarse, of the heaviest candidate [N m]; 0 where
+/// they never are.
+double coarse_below(const Replay& replay, const ReplayCandidate& heaviest);
+
 /// What a warning says of them.
 std::string coarse_cells_text(const CoarseCells& coarse);
 

@@ -130,11 +130,60 @@ void take(const data::PlacedSheet& sheet, data::Recording& recording) {
   recording.start = sheet.start;
 }
 
-/// As the settings have it [m].
-double size_of_patch(const data::RecordedGrasp& grasp, const ReplaySettings& settings) {
-  return shape_of(grasp, settings) == data::GraspShape::pinch
-             ? grasp.depth
-             : settings.grasp_within.value_or(grasp.select.within);
+/// Moves the cells along one side of a corner: a vertex at a distance `was` goes to `size`, others evenly,
+/// and none from `reach` on [m].
+void move_rows(const RestCorner& corner, int axis, double was, double size, double reach,
+               data::Points& rest) {
+  for (Eigen::Index i = 0; i < rest.rows(); ++i) {
+    const double u = (rest(i, axis) - corner.place[axis]) * corner.inwards[axis];
+    const double moved = u <= was    ? u * size / was
+                         : u < reach ? size + (u - was) * (reach - size) / (reach - was)
+                                     : u;
+    rest(i, axis) = corner.place[axis] + moved * corner.inwards[axis];
+  }
+}
+
+void start_as_at_rest(data::Recording& recording) {
+  recording.start = (recording.mesh.vertices * recording.base_from_object.linear().transpose()).rowwise() +
+                    recording.base_from_object.translation().transpose();
+}
+
+/// The row of vertices nearest to a distance from a corner, but that at the corner itself [m].
+double nearest_row(const data::Points& rest, const RestCorner& corner, int axis, double within) {
+  constexpr double kSame = 1e-9;  // of a side
+  const Eigen::ArrayXd all = (rest.col(axis).array() - corner.place[axis]) * corner.inwards[axis];
+  double nearest = all.maxCoeff();
+  const double least = kSame * nearest;
+  for (const double u : all)
+    if (u > least && std::abs(u - within) < std::abs(nearest - within)) nearest = u;
+  return nearest;
+}
+
+/// Whether the vertices of a specification stand in rows along both sides.
+bool has_rows(const std::string& mesh) {
+  const std::vector<std::string_view> words = data::split(mesh, ":");
+  return words.size() == 4 && words[0] == "sheet" && words[3] != "jittered" && words[3] != "delaunay";
+}
+
+/// Moves the rows of a pattern so that one lies on the edge of each patch at a corner: which cells there are
+/// does not decide how much of the sheet is held.
+void fit_rows(const ReplaySettings& settings, data::Recording& recording) {
+  constexpr double kSame = 1e-9, kMost = 0.9;  // of a distance; of what gives way
+  data::Points& rest = recording.mesh.vertices;
+  const Eigen::RowVector3d sides = rest.colwise().maxCoeff() - rest.colwise().minCoeff();
+  for (const data::RecordedGrasp& grasp : recording.grasps) {
+    if (!has_grasp_size(grasp, settings)) continue;
+    const RestCorner corner = rest_corner(rest, *grasp.select.corner);
+    const double within = size_of_patch(grasp, settings);
+    for (int axis = 0; axis < 2; ++axis) {
+      const double row = nearest_row(rest, corner, axis, within), most = std::max(row, within);
+      const double half = 0.5 * sides[axis],
+                   reach = most < kMost * half ? std::min(3 * most, half) : sides[axis];
+      if (std::abs(row - within) > kSame * within && most < kMost * reach)  // else across a whole strip
+        move_rows(corner, axis, row, within, reach, rest);
+    }
+  }
+  start_as_at_rest(recording);
 }
 
 /// Whether a specification is of a rectangle and names how its cells are cut.
@@ -143,6 +192,12 @@ bool names_pattern(const std::string& mesh) {
 }
 
 }  // namespace
+
+double size_of_patch(const data::RecordedGrasp& grasp, const ReplaySettings& settings) {
+  return shape_of(grasp, settings) == data::GraspShape::pinch
+             ? grasp.depth
+             : settings.grasp_within.value_or(grasp.select.within);
+}
 
 std::vector<data::Outline> grasp_outlines(const data::Recording& recording, const ReplaySettings& settings) {
   std::vector<data::Outline> outlines;
@@ -185,7 +240,11 @@ bool are_graded(const data::Recording& recording, const ReplaySettings& settings
 }
 
 void grade_towards_grasps(const ReplaySettings& settings, data::Recording& recording) {
-  if (!are_graded(recording, settings)) return;
+  if (!are_graded(recording, settings)) {
+    if (has_rows(recording.mesh_spec) && settings.grasp_cell != 0 && recording.start_mesh.empty())
+      fit_rows(settings, recording);
+    return;
+  }
   if (!names_pattern(recording.mesh_spec)) {
     const std::optional<double> cell = data::parse_number(data::split(recording.mesh_spec, ":")[2]);
     place_mesh(data::remeshed(recording.mesh, *cell), recording);
@@ -234,19 +293,12 @@ void resize_grasps(double size, ReplaySettings& settings, data::Recording& recor
       if (!(std::max(was, size) < 0.9 * reach))
         throw data::InputError("grasp_size: found " + data::format_short(size) + " m, expected less than " +
                                data::format_short(0.9 * sides[axis]) + " m, most of a side of the sheet");
-      for (Eigen::Index i = 0; i < rest.rows(); ++i) {
-        const double u = (rest(i, axis) - corner.place[axis]) * corner.inwards[axis];
-        const double moved = u <= was    ? u * size / was
-                             : u < reach ? size + (u - was) * (reach - size) / (reach - was)
-                                         : u;
-        rest(i, axis) = corner.place[axis] + moved * corner.inwards[axis];
-      }
+      move_rows(corner, axis, was, size, reach, rest);
     }
     grasp.select.within = size;
   }
   if (settings.grasp_within) settings.grasp_within = size;
-  recording.start = (rest * recording.base_from_object.linear().transpose()).rowwise() +
-                    recording.base_from_object.translation().transpose();
+  start_as_at_rest(recording);
 }
 
 }  // namespace flash::sysid

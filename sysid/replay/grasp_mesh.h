@@ -8,6 +8,9 @@
 
 namespace flash::sysid {
 
+/// The size of what a grasp takes, as the settings have it: of a pinch its depth [m].
+double size_of_patch(const data::RecordedGrasp& grasp, const ReplaySettings& settings);
+
 /// The outlines of what the grasps hold, in the rest shape, under settings that may replace the recording's:
 /// the edge of a clamped or pinched patch, and the point of one that is held in a point. Cells there are a
 /// fifth of those of the mesh, or of the patch where that is smaller, unless settings.grasp_cell says
@@ -27,7 +30,9 @@ bool are_graded(const data::Recording& recording, const ReplaySettings& settings
 /// patch at its corner is a plate clamped along two edges which meet at a re-entrant corner: its curvature
 /// grows as r^-0.46 about that (Williams 1952), and a motion on even cells is wrong by the first power of
 /// their size. A sheet whose specification names no pattern is meshed anew in even triangles first; any other
-/// keeps its vertices, but for those that slide onto an outline. Does nothing unless are_graded.
+/// keeps its vertices, but for those that slide onto an outline. Where a specification names a pattern in
+/// rows, rows move onto the edge of a clamped patch at a corner, so that as much is held whatever the cells.
+/// Anything else that is not are_graded stays as it is.
 void grade_towards_grasps(const ReplaySettings& settings, data::Recording& recording);
 
 /// Half of the cells of a recorded sheet, nested in them.

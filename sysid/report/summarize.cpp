@@ -7,10 +7,9 @@
 #include "data/recording_digest.h"
 #include "data/text.h"
 #include "sysid/emulate/candidate_lines.h"
+#include "sysid/emulate/search_warnings.h"
 #include "sysid/infer/held.h"
 #include "sysid/observe/registration_parameter.h"
-#include "sysid/replay/half_cell.h"
-#include "sysid/replay/recorded_grasp.h"
 #include "sysid/report/settings_texts.h"
 
 namespace flash::sysid {
@@ -108,28 +107,6 @@ std::string numbers_of_unconverged(const std::vector<CandidateResult>& candidate
       numbers += (numbers.empty() ? " " : ", ") + std::to_string(candidate.id);
   return std::string(count > 1 ? ": numbers" : ": number") + numbers + (count > kNamed ? ", ..." : "") +
          " of results.csv";
-}
-
-/// What the search's mesh and that of half the cell hold of a sheet differs where a cell does not divide the
-/// grasped patch: then cells of no size hold what neither does.
-std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) {
-  constexpr double kSame = 0.01;  // of the smaller extent of the sheet
-  std::vector<std::string> warnings;
-  for (const Replay& replay : replays) {
-    if (replay.recording.is_solid()) continue;
-    const Replay finer = on_half_the_cell(replay);
-    const Eigen::RowVector3d sides = replay.recording.mesh.vertices.colwise().maxCoeff() -
-                                     replay.recording.mesh.vertices.colwise().minCoeff();
-    for (std::size_t g = 0; g < replay.recording.grasps.size(); ++g) {
-      const double here = held_extent(replay, replay.recording.grasps[g]),
-                   there = held_extent(finer, finer.recording.grasps[g]);
-      if (std::abs(here - there) > kSame * sides.head<2>().minCoeff())
-        warnings.push_back(replay.recording.name + ": the gripper holds " + mm(here) +
-                           " of the sheet on the mesh of the search, and " + mm(there) +
-                           " on half its cells: choose cells that divide the patch (--mesh, --grasp-within)");
-    }
-  }
-  return warnings;
 }
 
 /// `best`: the estimate on the search's own mesh; `fit`: as it is registered in the answer.

@@ -34,7 +34,7 @@ class ExampleScenes : public testing::Test {
             fs::temp_directory_path() /
             ("flash_example_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
     fs::remove_all(folder_);
-    fs::create_directories(folder_);
+    for (const char* part : {"assets", "scenes"}) fs::create_directories(folder_ / part);
   }
   ~ExampleScenes() override { fs::remove_all(folder_); }
 
@@ -85,11 +85,11 @@ TEST_F(ExampleScenes, SticksAndSlipsOnTenDegrees) {
   constexpr double g = 9.81, h = 0.01, friction = 0.1753, tolerance = 1e-6;
   constexpr int steps = 100;
   const double slope = 10 * M_PI / 180;
-  for (const char* name :
-       {"incline_cloth.json", "incline_cloth_beside.json", "incline_stick.json", "incline_slip.json"})
+  for (const char* name : {"assets/incline_cloth.json", "assets/incline_cloth_beside.json",
+                           "scenes/incline_stick.json", "scenes/incline_slip.json"})
     take(name);
   const auto slid = [&](const std::string& scene) {
-    EXPECT_EQ(run(scene + ".json", steps, scene, tolerance).unconverged_steps, 0);
+    EXPECT_EQ(run("scenes/" + scene + ".json", steps, scene, tolerance).unconverged_steps, 0);
     const data::Points moved = frame(scene, steps) - frame(scene, 0);
     return moved.colwise().mean().norm();
   };
@@ -102,13 +102,13 @@ TEST_F(ExampleScenes, SticksAndSlipsOnTenDegrees) {
 }
 
 TEST_F(ExampleScenes, ASoftGripperHoldsASoftCube) {
-  take("gripper.json");
-  take("soft_finger.json", {{":0.0075", ":0.015"}});
-  take("soft_cube.json", {{":0.006", ":0.01"}});
+  take("scenes/gripper.json");
+  take("assets/soft_finger.json", {{":0.0075", ":0.015"}});
+  take("assets/soft_cube.json", {{":0.006", ":0.01"}});
   constexpr int steps = 160, cube_vertices = 4 * 4 * 4;
   constexpr double lift = 0.08, cube_weight = 1000 * 0.03 * 0.03 * 0.03 * 9.81,
                    finger_weight = 1000 * 0.016 * 0.03 * 0.06 * 9.81;
-  EXPECT_EQ(run("gripper.json", steps, "out").unconverged_steps, 0);
+  EXPECT_EQ(run("scenes/gripper.json", steps, "out").unconverged_steps, 0);
   EXPECT_EQ(last_force("out", "table"), 0);
   const double carried = last_force("out", "left_hand") + last_force("out", "right_hand");
   EXPECT_NEAR(carried, cube_weight + 2 * finger_weight, 2e-3 * carried);  // the tolerance, twice
@@ -119,11 +119,11 @@ TEST_F(ExampleScenes, ASoftGripperHoldsASoftCube) {
 /// The first fold, on a coarse mesh: the hand lays the sleeve over the front, every step is solved, and
 /// nothing passes through.
 TEST_F(ExampleScenes, ATShirtsSleeveIsFolded) {
-  take("tshirt_fold.json");
-  take("tshirt.json", {{":0.0138", ":0.0425"}});
+  take("scenes/tshirt_fold.json");
+  take("assets/tshirt.json", {{":0.0138", ":0.0425"}});
   constexpr int steps = 300;
   constexpr double thickness = 1e-3;
-  const SceneSummary summary = run("tshirt_fold.json", steps, "out");
+  const SceneSummary summary = run("scenes/tshirt_fold.json", steps, "out");
   EXPECT_EQ(summary.unconverged_steps, 0);
   EXPECT_GT(summary.layer_distance_min, 0.5 * thickness);
   // Most steps take the sleeve over the front: about eight iterations each.
@@ -153,13 +153,13 @@ TEST_F(ExampleScenes, ATShirtsSleeveIsFolded) {
 
 /// The published method on two local-global and two contact iterations stays bounded, at ten times the speed.
 TEST_F(ExampleScenes, TwoPlusTwoIterationsStayBounded) {
-  take("two_plus_two.json");
-  take("towel.json");
+  take("scenes/two_plus_two.json");
+  take("assets/towel.json");
   constexpr int steps = 150;
-  const SceneSummary budget = run("two_plus_two.json", steps, "budget");
+  const SceneSummary budget = run("scenes/two_plus_two.json", steps, "budget");
   EXPECT_EQ(budget.unconverged_steps, steps);  // and says so
-  take("two_plus_two.json", {{R"("type": "projective", "iterations": 2)", R"("type": "newton")"}});
-  const SceneSummary exact = run("two_plus_two.json", steps, "exact");
+  take("scenes/two_plus_two.json", {{R"("type": "projective", "iterations": 2)", R"("type": "newton")"}});
+  const SceneSummary exact = run("scenes/two_plus_two.json", steps, "exact");
   EXPECT_EQ(exact.unconverged_steps, 0);
   const double diagonal = 0.3 * std::sqrt(2.0), lifted = 0.25;
   const auto reach = [&](const std::string& out, int step) {

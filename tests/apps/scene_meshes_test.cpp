@@ -48,11 +48,13 @@ TEST_F(SceneRunTest, AClothThatFallsOverAChairComesToRestOutsideOfIt) {
     EXPECT_NE(text.find(old), std::string::npos) << old;
     return text.replace(text.find(old), old.size(), by);
   };
-  write("chair.obj", read("chair.obj"));
-  write("blanket.json", replaced(read("blanket.json"), "1.1x1.1:0.025", "1.1x1.1:0.055"));
+  write("chair.obj", read("assets/chair.obj"));
+  write("blanket.json", replaced(read("assets/blanket.json"), "1.1x1.1:0.025", "1.1x1.1:0.055"));
   // 0.72 of a cell, as in the example.
-  const std::string path =
-      write("scene.json", replaced(read("chair.json"), R"("margin": 0.018)", R"("margin": 0.0396)"));
+  std::string scene = replaced(read("scenes/chair.json"), R"("margin": 0.018)", R"("margin": 0.0396)");
+  for (const char* name : {"chair.obj", "blanket.json"})
+    scene = replaced(scene, std::string("../assets/") + name, name);
+  const std::string path = write("scene.json", scene);
   const SceneSummary summary = run_scene(data::load_scene(path), {}, out());
   EXPECT_EQ(summary.steps, 500);
   EXPECT_EQ(summary.unconverged_steps, 0);

@@ -38,6 +38,21 @@ TEST(MeshPicture, UpIsUpAndTheEyeStandsWhereItIsSaid) {
   EXPECT_EQ(picture.at(170, 60)[1], 0);
 }
 
+// A sheet that rests on a table sinks into it by rounding, here and there.
+TEST(MeshPicture, WhatLiesOnAnotherMeshShowsWhereItIsNamedFirst) {
+  TriangleMesh sheet = rectangle({.width = 1, .height = 1, .cells_x = 2, .cells_y = 2});
+  const TriangleMesh table = rectangle({.width = 1, .height = 1, .cells_x = 1, .cells_y = 1});
+  const auto middle = [&](double height, std::size_t channel) {
+    TriangleMesh lying = sheet;
+    lying.vertices.col(2).array() += height;
+    return draw_meshes({{lying, {200, 0, 0}}, {table, {0, 0, 200}}},
+                       {.width = 50, .height = 50, .azimuth = 0, .elevation = 40})
+        .at(25, 25)[channel];
+  };
+  for (const double height : {-1e-6, 0.0, 1e-6}) EXPECT_GT(middle(height, 0), 80) << height;
+  EXPECT_GT(middle(-0.01, 2), 80);  // below the table
+}
+
 TEST(MeshPicture, NothingIsAnEmptyPicture) {
   EXPECT_EQ(draw_meshes({}, {.width = 4, .height = 4}).at(1, 1), (Colour{255, 255, 255}));
 }

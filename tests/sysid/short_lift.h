@@ -38,7 +38,7 @@ inline Replay short_lift(const data::TemporaryFolder& folder,
   settings.displacement = Eigen::Vector3d(-0.02, 0, 0.04);
   settings.duration = 0.4;
   settings.keyframe_rate = 50;
-  settings.grasp_within = 0.051;
+  settings.grasp_within = 0.05;
   settings.clamp_slopes = true;
   settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02})};
   SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, material, settings, {});

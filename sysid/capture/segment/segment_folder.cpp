@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "data/atomic_file.h"
 #include "data/depth_image.h"
 #include "data/error.h"
 #include "data/extrinsics.h"
@@ -275,6 +276,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
     const int next = static_cast<int>(shown.size());
     if (next < columns && k == (columns == 1 ? 0 : next * (frames - 1) / (columns - 1))) {
       frame.labels = segmentation.labels;
+      if (!times.empty()) frame.time = times[k];
       shown.push_back(std::move(frame));
     }
     segmentation.labels.clear();
@@ -291,8 +293,8 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
     result.clouds.push_back(frame_name(k));
     data::save_point_cloud(result.frames[k].cloth, (fs::path(staged.path()) / result.clouds.back()).string());
   }
-  result.picture = "segment.png";
-  data::save_png(draw_segmentation(shown), (fs::path(staged.path()) / result.picture).string());
+  result.picture = "segment.svg";
+  data::write_atomically((fs::path(staged.path()) / result.picture).string(), draw_segmentation(shown));
   SegmentedCell cell;
   if (result.table) cell.table = {result.table->plane.point, result.table->plane.normal};
   cell.times = times;

@@ -61,7 +61,7 @@ struct SegmentFolderSettings {
 };
 
 /// Cuts the cloth out of every frame, all views of one index merged, and writes `folder`/frames/NNNNNN.ply,
-/// what it knows of the cell (segmented_cell.h), and segment.png: each column a frame, from the side above,
+/// what it knows of the cell (segmented_cell.h), and segment.svg: each column a frame, from the side above,
 /// from the top below; cloth red, table grey, arm blue, other clusters ochre, outliers violet. `times`: one a
 /// frame [s]; they count where there is a gripper, and may be empty without one. The table is sought in what
 /// masks hide as well. Throws InputError, and leaves nothing behind, where views differ in their number of

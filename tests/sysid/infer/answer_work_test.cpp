@@ -5,15 +5,13 @@
 namespace flash::sysid {
 namespace {
 
-TEST(AnswerMeter, TakesTheTimeOfWhatIsLeftFromThatOfItsKind) {
+TEST(AnswerMeter, CountsWhatIsDoneAndWhatThereIsAtMost) {
   AnswerMeter meter({.motions = 4, .scores = 100});
-  EXPECT_EQ(meter.seconds_left(), 0);  // nothing is known
-  meter.take({.motions = 1, .scores = 0}, {}, 6);
-  EXPECT_EQ(meter.seconds_left(), 3 * 6);
-  meter.take({.motions = 0, .scores = 10}, {}, 5);
-  EXPECT_EQ(meter.seconds_left(), 3 * 6 + 90 * 0.5);
-  meter.take({}, {.motions = 3, .scores = 80}, 0);
-  EXPECT_EQ(meter.seconds_left(), 10 * 0.5);
+  meter.take({.motions = 1, .scores = 10}, {.motions = 2, .scores = 80});
+  meter.take({}, {.motions = -1});  // needed beside it
+  EXPECT_EQ(meter.done().motions, 1);
+  EXPECT_EQ(meter.done().scores, 10);
+  EXPECT_EQ(meter.most().motions, 3);
   EXPECT_EQ(meter.most().scores, 20);
 }
 

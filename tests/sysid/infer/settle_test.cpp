@@ -86,7 +86,7 @@ Replay balanced_strip(const data::TemporaryFolder& folder, const data::SheetMate
   settings.displacement = Eigen::Vector3d(0, 0, 0.04);
   settings.duration = 0.4;
   settings.rest = 0.8;
-  settings.grasp_within = 0.051;
+  settings.grasp_within = 0.05;
   settings.clamp_slopes = true;
   settings.cameras = {small_camera({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02})};
   SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, truth, settings, {});

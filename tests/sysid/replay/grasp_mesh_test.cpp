@@ -60,6 +60,41 @@ TEST(GraspMesh, HoldsThePatchItselfWhateverTheCells) {
   }
 }
 
+// Of any size, on any cells: those that shrink towards the grasp, those of a pattern, and those of a file.
+TEST(GraspMesh, AFinerMeshHoldsTheSamePatch) {
+  for (const double within : {0.017, 0.02, 0.033})
+    for (const char* cell : {"0.02", "0.01", "0.005"})
+      for (const char* pattern : {"", ":alternating", ":one_way", ":alternating_by_row", "file"}) {
+        const bool file = std::string(pattern) == "file";
+        data::Recording recording = towel("sheet:0.2x0.2:" + std::string(cell) + (file ? "" : pattern));
+        if (file) recording.mesh_spec = "towel.obj";
+        ReplaySettings settings;
+        settings.grasp_within = within;
+        recording.grasps[0].select.within = within;  // as held_area looks for it
+        grade_towards_grasps(settings, recording);
+        EXPECT_NEAR(held_area(recording), within * within, kSliver)
+            << within << ' ' << cell << ' ' << pattern;
+        EXPECT_EQ(recording.start, recording.mesh.vertices);
+        EXPECT_EQ(recording.mesh.vertices.col(0).maxCoeff(), 0.2);
+        for (const auto& t : recording.mesh.triangles.rowwise()) {
+          const Eigen::Vector3d a = recording.mesh.vertices.row(t[1]) - recording.mesh.vertices.row(t[0]),
+                                b = recording.mesh.vertices.row(t[2]) - recording.mesh.vertices.row(t[0]);
+          EXPECT_GT(a.cross(b).z(), 0);
+        }
+      }
+}
+
+TEST(GraspMesh, RowsOfTwoPatchesDoNotMoveEachOther) {
+  data::Recording recording = towel("sheet:0.2x0.2:0.02:alternating");
+  recording.grasps.push_back(recording.grasps[0]);
+  recording.grasps[0].select.within = recording.grasps[1].select.within = 0.027;
+  recording.grasps[1].select.corner = {0, 1};
+  grade_towards_grasps({}, recording);
+  EXPECT_NEAR(held_area(recording), 0.027 * 0.027, 1e-12);
+  std::swap(recording.grasps[0], recording.grasps[1]);
+  EXPECT_NEAR(held_area(recording), 0.027 * 0.027, 1e-12);
+}
+
 TEST(GraspMesh, ABoxAcrossTheSheetHasNoCornersAndAPartOfItsEdgeHas) {
   data::Recording recording = towel("sheet:0.2x0.2:0.02:alternating");
   data::Selection& select = recording.grasps[0].select;

@@ -99,7 +99,7 @@ TEST_F(SegmentFolder, DepthImagesBecomeTheLiftedPatchInTheBaseFrame) {
     EXPECT_NEAR(cloth.col(0).minCoeff(), camera_position.x() - 0.1, 0.012);
     EXPECT_NEAR(cloth.col(1).mean(), camera_position.y(), 0.002);
   }
-  EXPECT_TRUE(fs::exists(folder("out") + "/segment.png"));
+  EXPECT_TRUE(fs::exists(folder("out") + "/segment.svg"));
 }
 
 TEST_F(SegmentFolder, CamerasThatCannotBeUsedAreRefusedUnlessAccepted) {

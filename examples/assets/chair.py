@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A chair as one surface of triangles: seat, back and four legs, boxes that reach into each other. Prints it as OBJ [m].
 
-  examples/chair.py > examples/chair.obj
+  examples/assets/chair.py > examples/assets/chair.obj
 """
 import math
 
@@ -42,7 +42,7 @@ if __name__ == "__main__":
     for corners in parts():
         faces += [tuple(k + len(vertices) for k in face) for face in FACES]
         vertices += corners
-    print("# A chair [m], by examples/chair.py")
+    print("# A chair [m], by examples/assets/chair.py")
     for vertex in vertices:
         print("v %.6f %.6f %.6f" % vertex)
     for face in faces:

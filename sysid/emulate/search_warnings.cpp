@@ -1,0 +1,105 @@
+#include "sysid/emulate/search_warnings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "data/text.h"
+#include "sysid/replay/coarse_cells.h"
+#include "sysid/replay/grasp_mesh.h"
+#include "sysid/replay/half_cell.h"
+#include "sysid/replay/recorded_grasp.h"
+
+namespace flash::sysid {
+namespace {
+
+std::string mm(double length) { return data::format_short(std::round(1e5 * length) / 100) + " mm"; }
+
+Eigen::Vector2d sides_of(const Replay& replay) {
+  return (replay.recording.mesh.vertices.colwise().maxCoeff() -
+          replay.recording.mesh.vertices.colwise().minCoeff())
+      .head<2>()
+      .transpose();
+}
+
+/// Of a patch at a corner against the one that was stated; empty where they agree.
+std::string corner_warning(const Replay& replay, const data::RecordedGrasp& grasp) {
+  constexpr double kSame = 0.1;  // of the patch
+  const double within = size_of_patch(grasp, replay.settings),
+               stated = sides_of(replay).cwiseMin(within).norm(), held = held_extent(replay, grasp);
+  if (std::abs(held - stated) <= kSame * stated) return "";
+  return replay.recording.name + ": the cells hold " + mm(held) +
+         " of the sheet from corner to corner of the patch, where " + mm(stated) +
+         " are stated: leave the pattern of --mesh and --grasp-cell out, or choose cells that divide the "
+         "patch "
+         "(--mesh, --grasp-within)";
+}
+
+/// Of the values searched, those that bend most and least under their weight.
+ReplayCandidate extreme_candidate(const GridSettings& settings, bool limpest) {
+  std::vector<double> values;
+  for (const Axis& axis : settings.axes) {
+    const auto [least, most] = std::minmax_element(axis.values.begin(), axis.values.end());
+    values.push_back((axis.name == "areal_density") == limpest ? *most : *least);
+  }
+  return candidate_at(values, settings);
+}
+
+/// `below`: the bending from which on cells are not coarse [N m].
+std::string coarse_text(const Replay& replay, double below, double least) {
+  const std::string half = scaled_cell(replay.recording.mesh_spec, 0.5);
+  return replay.recording.name + ": cells of " + mm(typical_cell(replay.recording.mesh)) +
+         " are coarse for the fold in which the sheet leaves the table where bending is below " +
+         data::format_short(below) + " N m, and " + data::format_short(least) +
+         " N m is searched: an answer there may be off by a few percent more than is said of it. On half of "
+         "the cells (--mesh " +
+         (half.empty() ? "FILE" : half) + ") that begins below " + data::format_short(below / 8) + " N m";
+}
+
+}  // namespace
+
+ReplayCandidate limpest_candidate(const GridSettings& settings) { return extreme_candidate(settings, true); }
+
+std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) {
+  constexpr double kSame = 0.01;  // of the smaller extent of the sheet
+  std::vector<std::string> warnings;
+  for (const Replay& replay : replays) {
+    if (replay.recording.is_solid()) continue;
+    std::optional<Replay> finer;
+    for (std::size_t g = 0; g < replay.recording.grasps.size(); ++g) {
+      const data::RecordedGrasp& grasp = replay.recording.grasps[g];
+      if (shape_of(grasp, replay.settings) == data::GraspShape::point) continue;
+      if (grasp.select.corner) {
+        if (const std::string text = corner_warning(replay, grasp); !text.empty()) warnings.push_back(text);
+        continue;
+      }
+      if (!finer) finer = on_half_the_cell(replay);
+      const double here = held_extent(replay, grasp), there = held_extent(*finer, finer->recording.grasps[g]);
+      if (std::abs(here - there) > kSame * sides_of(replay).minCoeff())
+        warnings.push_back(replay.recording.name + ": the gripper holds " + mm(here) +
+                           " of the sheet on the mesh of the search, and " + mm(there) +
+                           " on half its cells: choose cells that divide the patch (--mesh, --grasp-within)");
+    }
+  }
+  return warnings;
+}
+
+KnownBefore known_before(const std::vector<Replay>& replays, const GridSettings& settings) {
+  KnownBefore known{warnings_of_grasps(replays), {}};
+  if (settings.base.solid) return known;
+  const ReplayCandidate limpest = limpest_candidate(settings), stiffest = extreme_candidate(settings, false);
+  for (const Replay& replay : replays) {
+    const double below = coarse_below(replay, limpest), least = limpest.material.bending_rigidity;
+    if (!(least < below)) continue;
+    const bool all = stiffest.material.bending_rigidity < coarse_below(replay, stiffest);
+    (all ? known.warnings : known.notices).push_back(coarse_text(replay, below, least));
+  }
+  return known;
+}
+
+GridSettings held_at(const std::vector<double>& values, GridSettings settings) {
+  for (std::size_t k = 0; k < settings.axes.size(); ++k) settings.axes[k].values = {values[k]};
+  return settings;
+}
+
+}  // namespace flash::sysid

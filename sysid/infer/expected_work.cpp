@@ -1,0 +1,85 @@
+#include "sysid/infer/expected_work.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/estimate_errors.h"
+#include "sysid/infer/held.h"
+#include "sysid/infer/lattice_about.h"
+#include "sysid/replay/grasp_mesh.h"
+#include "sysid/replay/half_cell.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kScore = 1.0 / 40;  // of a candidate, as motions of a towel are scored
+constexpr double kLookShare = 0.2;   // of the points that two looks may take
+constexpr double kFollow = 0.6;      // of looks after which the cells of the sheet are halved anew
+constexpr double kSheetHalved = 4;   // vertices, of half the cells, and of the grasps alone
+constexpr double kGraspsHalved = 1.3;
+
+/// Vertices of the finer mesh over those of the search's.
+double finer_vertices(const std::vector<Replay>& replays) {
+  double own = 0, finer = 0;
+  for (const Replay& replay : replays) {
+    const auto vertices = static_cast<double>(replay.recording.mesh.vertices.rows());
+    own += vertices;
+    if (!are_graded(replay.recording, replay.settings)) {
+      finer += (replay.recording.is_solid() ? 8 : 4) * vertices;
+      continue;
+    }
+    data::Recording smaller = replay.recording;
+    refine_grasps(replay.settings, 0.25, smaller);
+    finer += static_cast<double>(smaller.mesh.vertices.rows());
+  }
+  return finer / own;
+}
+
+}  // namespace
+
+double motion_cost(double vertices, double steps) { return std::pow(vertices, 1.5) * std::sqrt(steps); }
+
+double time_together(const std::vector<SimulatedTogether>& simulations, int threads) {
+  double sum = 0, longest = 0;
+  for (const SimulatedTogether& each : simulations) {
+    sum += each.count * each.each;
+    if (each.count > 0) longest = std::max(longest, each.each);
+  }
+  return std::max(sum, threads * longest);
+}
+
+ExpectedWork expected_work(const std::vector<Replay>& replays, const GridSettings& grid, bool solver_check) {
+  const auto searched = static_cast<double>(std::count_if(
+      grid.axes.begin(), grid.axes.end(), [](const Axis& axis) { return axis.values.size() > 1; }));
+  const double finer = solver_check ? motion_cost(finer_vertices(replays), 1) : 0;
+  const bool other_cells = solver_check && are_graded(replays);
+  const double held = 2.0 * static_cast<double>(held_parameters(grid, replays).size());
+  const double looks = kLookShare * kScore * most_scores(grid.axes);
+  const int threads = grid.threads;
+
+  std::vector<SimulatedTogether> at_estimate = {{1 + held, 1}, {emulator_draws, 1}};
+  if (solver_check) at_estimate = {{2 + held, 1}, {1 + emulator_draws, motion_cost(1, 2)}, {1, finer}};
+  std::vector<SimulatedTogether> at_first = at_estimate;
+  const std::vector<SimulatedTogether> cells = {{1, motion_cost(kGraspsHalved, 1)},
+                                                {1, motion_cost(kSheetHalved, 1)}};
+  if (solver_check) at_first.push_back({1, motion_cost(1, 4)});
+  if (other_cells) at_first.insert(at_first.end(), cells.begin(), cells.end());
+  const double follow = other_cells ? kFollow * time_together(cells, threads) : 0;
+
+  ExpectedWork work;
+  // First what is predictable, and how finer cells move the best candidate.
+  work.first_look = time_together({{2 + searched, 1}}, threads) + time_together({{1, finer}}, threads) +
+                    time_together(at_first, threads) + looks + follow;
+  work.end = time_together({{1, 1}}, threads) + time_together({{1, finer}}, threads);
+  if (most_motions(grid.axes).first == 0) return work;
+  const double own_motions = std::min(std::pow(3, searched), static_cast<double>(few_motions(grid.axes))),
+               finer_motions = std::min(std::pow(2, searched), own_motions);
+  work.lattice = time_together({{own_motions, 1}}, threads) +
+                 (solver_check ? time_together({{finer_motions, finer}}, threads) : 0) +
+                 time_together(at_estimate, threads) + looks + follow;
+  work.lattices = 0.5 + searched;
+  return work;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,62 @@
+#include "sysid/emulate/search_warnings.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sysid/replay/coarse_cells.h"
+#include "tests/sysid/short_lift.h"
+
+namespace flash::sysid {
+namespace {
+
+GridSettings search_of(const std::vector<double>& bending) {
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {{"bending", bending, true}};
+  return grid;
+}
+
+TEST(SearchWarnings, CoarseCellsAreToldBeforeASearchOfWhereTheyAre) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_corner_lift(folder, 0.1)};
+  const double weight = 9.81 * short_lift_material().areal_density,
+               below = weight * std::pow(typical_cell(replays[0].recording.mesh) / 0.5, 3);
+  const auto known = [&](double low, double high) {
+    return known_before(replays, search_of({low * below, high * below}));
+  };
+  EXPECT_TRUE(known(1.01, 4).warnings.empty());
+  EXPECT_TRUE(known(1.01, 4).notices.empty());
+  // A part of the range: the answer may be elsewhere.
+  EXPECT_TRUE(known(0.5, 4).warnings.empty());
+  ASSERT_EQ(known(0.5, 4).notices.size(), 1u);
+  EXPECT_NE(known(0.5, 4).notices[0].find("On half of the cells (--mesh sheet:0.2x0.2:0.02)"),
+            std::string::npos)
+      << known(0.5, 4).notices[0];
+  EXPECT_TRUE(known(0.5, 0.9).notices.empty());
+  EXPECT_EQ(known(0.5, 0.9).warnings.size(), 1u);
+}
+
+TEST(SearchWarnings, AnEstimateToGoOnFromIsTheWholeRange) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_corner_lift(folder, 0.1)};
+  EXPECT_EQ(known_before(replays, held_at({1e-7}, search_of({1e-7, 1}))).warnings.size(), 1u);
+  EXPECT_TRUE(known_before(replays, held_at({1}, search_of({1e-7, 1}))).warnings.empty());
+}
+
+// Cells that shrink towards the grasp hold the patch that was stated; too large ones there do not.
+TEST(SearchWarnings, APatchThatCellsDoNotHoldIsTold) {
+  const data::TemporaryFolder folder;
+  Replay replay = short_corner_lift(folder, 0.1);
+  EXPECT_TRUE(warnings_of_grasps({replay}).empty());
+  ReplaySettings settings;
+  settings.grasp_cell = 0;  // the mesh as it is: cells of 40 mm
+  replay = make_replay(data::load_recording(folder / "towel"), settings);
+  const std::vector<std::string> warnings = warnings_of_grasps({replay});
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("the cells hold 0 mm of the sheet"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find("where 28.28 mm are stated"), std::string::npos) << warnings[0];
+}
+
+}  // namespace
+}  // namespace flash::sysid
