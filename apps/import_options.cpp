@@ -203,8 +203,13 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
         !gap.empty())
       throw data::InputError("--times: found none, but " + gap +
                              ": expected a CSV file with the time of each frame that is there");
-  if (!options.depth.empty() && (settings.intrinsics.empty() || settings.extrinsics.empty()))
-    throw data::InputError("import: --depth needs --intrinsics and --extrinsics");
+  if (!options.depth.empty() && settings.extrinsics.empty())
+    throw data::InputError("import: --depth needs --extrinsics, and --intrinsics where these hold no lens");
+  std::string own;
+  settings.lens = data::parse_lens_choice(options.lens, own);
+  if (!own.empty() && !settings.intrinsics.empty())
+    throw data::InputError("--lens: found " + own + ", expected stated or solved beside --intrinsics");
+  if (!own.empty()) settings.intrinsics = own;
 }
 
 }  // namespace flash

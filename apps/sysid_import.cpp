@@ -138,6 +138,12 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--extrinsics", settings.extrinsics,
                    "T_base_camera: the extrinsics of flash-calib, or a TUM file")
       ->needs(depth);
+  verb->add_option(
+          "--lens", texts.lens,
+          "Where --extrinsics hold with another lens than --intrinsics: solved takes theirs, stated that "
+          "of --intrinsics, a file that one. Without it such files are refused")
+      ->needs(depth)
+      ->type_name("stated|solved|FILE");
   verb->add_option("--depth-scale", settings.depth_scale, "Metres per count of the depth images")
       ->check(positive_number())
       ->capture_default_str();

@@ -34,6 +34,69 @@ NamedTransform read_transform(const JsonObject& object) {
   return transform;
 }
 
+namespace {
+
+constexpr const char* kRemark = "lens {";
+
+/// Of one lens: focal_px, centre_px and distortion.
+CameraIntrinsics read_lens(const JsonObject& object, const Eigen::Vector2d& size) {
+  CameraIntrinsics lens;
+  constexpr double kLargest = 1e5;  // [px]
+  if (!(size.minCoeff() >= 1 && size.maxCoeff() <= kLargest))
+    throw object.error("size_px", "width and height in pixels");
+  lens.width = static_cast<int>(size.x());
+  lens.height = static_cast<int>(size.y());
+  const Eigen::Vector2d focal = object.vector("focal_px", 2), centre = object.vector("centre_px", 2);
+  if (!(focal.minCoeff() > 0)) throw object.error("focal_px", "two numbers above 0");
+  lens.fx = focal.x();
+  lens.fy = focal.y();
+  lens.cx = centre.x();
+  lens.cy = centre.y();
+  const Eigen::VectorXd distortion = object.vector("distortion", -1);
+  if (distortion.size() > 8) throw object.error("distortion", "at most 8 coefficients");
+  if (distortion.isZero(0)) return lens;
+  const bool rational = distortion.size() > 5;
+  lens.model = rational ? DistortionModel::rational_polynomial : DistortionModel::plumb_bob;
+  lens.distortion.assign(distortion.begin(), distortion.end());
+  lens.distortion.resize(rational ? 8 : 5, 0.0);
+  return lens;
+}
+
+/// Files of pairs of poses have none.
+void read_lenses(const JsonObject& file, CameraPose& pose) {
+  if (!file.has("lens")) return;
+  const JsonObject lens = file.object("lens");
+  if (!lens.has("size_px")) return;
+  const Eigen::Vector2d size = lens.vector("size_px", 2);
+  pose.lens = read_lens(lens, size);
+  if (lens.has("stated")) pose.stated = read_lens(lens.object("stated"), size);
+}
+
+}  // namespace
+
+std::string lens_remark(const CameraIntrinsics& lens) {
+  const auto list = [](std::initializer_list<double> values) {
+    std::string text;
+    for (const double value : values) text += (text.empty() ? "" : ", ") + format_number(value);
+    return '[' + text + ']';
+  };
+  std::string distortion;
+  for (const double c : lens.distortion) distortion += (distortion.empty() ? "" : ", ") + format_number(c);
+  return std::string(kRemark) + R"("size_px": )" + list({double(lens.width), double(lens.height)}) +
+         R"(, "focal_px": )" + list({lens.fx, lens.fy}) + R"(, "centre_px": )" + list({lens.cx, lens.cy}) +
+         R"(, "distortion": [)" + distortion + "]}";
+}
+
+std::optional<CameraIntrinsics> find_lens_remark(const std::string& text, const std::string& path) {
+  const std::size_t found = text.find(kRemark);
+  if (found == std::string::npos) return std::nullopt;
+  const std::size_t begin = found + std::string(kRemark).size() - 1, end = text.find('}', begin);
+  const nlohmann::json json = nlohmann::json::parse(text.substr(begin, end + 1 - begin), nullptr, false);
+  if (!json.is_object()) throw input_error(path, "lens", "expected {\"size_px\": [...], ...}");
+  const JsonObject object(json, path, "lens");
+  return read_lens(object, object.vector("size_px", 2));
+}
+
 CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
   file.expect_fields({"schema",      "setup",      "method",        "transform",
                       "target_pose", "covariance", "predicted_sd",  "sigmas",
@@ -48,6 +111,7 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
     throw file.error("schema", "\"flash-extrinsics/2\" or \"flash-extrinsics/1\"");
   CameraPose pose;
   pose.transform = read_transform(file.object("transform"));
+  read_lenses(file, pose);
   pose.warnings = read_warnings(file);
   pose.usable = file.integer("exit_code", 0) == 0;
   if (!pose.usable && !accept_unusable)

@@ -248,10 +248,9 @@ void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_
   const Vector6d away = motion_between(result.poses.X, refined.bundle.cameras.front());
   const bool depends = away.dot(result.covariance.ldlt().solve(away)) > kChiSquare999;
   char text[200];
-  std::snprintf(
-      text, sizeof text,
-      "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --stated-intrinsics out",
-      1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
+  std::snprintf(text, sizeof text,
+                "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --lens stated out",
+                1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
   tell_first(result, lens_differs(lens) + text, depends);
 }
 
@@ -425,6 +424,9 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
     result.repeatable = pixels->repeatable;
   }
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
+  result.lens.stated = to_vector(camera);
+  result.lens.camera_shift =
+      camera_shift(bundle, result.unknowns, result.refined.covariance, result.lens.stated);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
   result.edges = edge_estimate(bundle, result.unknowns, result.shared_covariance);
   if (settings.lens != given.lens)

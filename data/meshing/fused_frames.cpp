@@ -30,15 +30,21 @@ Points points_of(const std::vector<double>& coordinates) {
 
 }  // namespace
 
-Points fused_depth(const DepthFrames& frames, bool accept_unusable) {
+Points fused_depth(const DepthFrames& frames, bool accept_unusable, std::string& notice) {
   const std::vector<std::string> files = files_in_order(frames.folder, {".png"});
   if (files.empty()) throw InputError(frames.folder + ": found no .png");
-  const CameraIntrinsics camera = load_camera_intrinsics(frames.intrinsics);
+  std::optional<LensOfFile> own;
+  if (!frames.intrinsics.empty()) own = {load_camera_intrinsics(frames.intrinsics), frames.intrinsics};
+  CameraPose still;
   std::vector<Eigen::Isometry3d> poses;
-  if (frames.poses.empty())
-    poses.assign(files.size(), load_camera_pose(frames.extrinsics, accept_unusable).transform.T);
-  else
+  if (frames.poses.empty()) {
+    still = load_camera_pose(frames.extrinsics, accept_unusable);
+    poses.assign(files.size(), still.transform.T);
+  } else {
     poses = load_trajectory(frames.poses).poses;
+  }
+  const auto [camera, said] = posed_lens(still, frames.extrinsics, own, frames.lens);
+  notice = said;
   if (poses.size() != files.size())
     throw InputError(frames.poses + ": found " + format_count(poses.size()) + " poses, expected " +
                      format_count(files.size()) + ", one a frame of " + frames.folder);

@@ -179,9 +179,13 @@ void import_frames(const ImportSettings& settings, data::Recording& recording) {
   }
   if (!depth) return;
   data::RecordedCamera camera;
-  camera.intrinsics = data::load_camera_intrinsics(settings.intrinsics);
-  camera.intrinsics_path = settings.intrinsics;
   const data::CameraPose pose = data::load_camera_pose(settings.extrinsics, settings.accept_unusable);
+  std::optional<data::LensOfFile> own;
+  if (!settings.intrinsics.empty())
+    own = {data::load_camera_intrinsics(settings.intrinsics), settings.intrinsics};
+  const data::PosedLens lens = data::posed_lens(pose, settings.extrinsics, own, settings.lens);
+  if (!lens.notice.empty()) recording.notices.push_back(lens.notice);
+  camera.intrinsics = lens.lens;
   camera.base_from_camera = pose.transform.T;
   camera.warnings = pose.warnings;
   if (!pose.usable)

@@ -174,6 +174,19 @@ std::string frame_name(int frame) {
   return name;
 }
 
+/// Of depth images, whose camera is at `pose`.
+void take_lens(const data::CameraPose& pose, const std::string& pose_path, const RawViewFiles& given,
+               RawView& view) {
+  const std::string beside = (fs::path(view.folder) / "camera_info.yaml").string();
+  const std::string path = given.intrinsics.empty() ? beside : given.intrinsics;
+  std::optional<data::LensOfFile> own;
+  if (!pose.lens || !given.intrinsics.empty() || fs::exists(beside))
+    own = {data::load_camera_intrinsics(path), path};
+  const data::PosedLens lens = data::posed_lens(pose, pose_path, own, given.lens);
+  view.camera = lens.lens;
+  if (!lens.notice.empty()) view.warnings.push_back(lens.notice);
+}
+
 }  // namespace
 
 RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
@@ -191,8 +204,6 @@ RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
     if (view.files.empty())
       throw data::input_error(folder, "folder",
                               "found neither clouds (.ply, .pcd) nor 16-bit depth images (.png)");
-    view.camera = data::load_camera_intrinsics(
-        given.intrinsics.empty() ? (fs::path(folder) / "camera_info.yaml").string() : given.intrinsics);
     view.depth_scale = given.depth_scale.value_or(view.depth_scale);
   }
   if (!given.masks.empty())
@@ -202,13 +213,14 @@ RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
   for (const char* name : {"extrinsics.json", "extrinsics.tum"})
     if (const fs::path path = fs::path(folder) / name; extrinsics.empty() && fs::exists(path))
       extrinsics = path.string();
+  if (!clouds && extrinsics.empty())
+    throw data::input_error((fs::path(folder) / "extrinsics.json").string(), "file",
+                            "missing: depth images need the pose of their camera, here or as --extrinsics");
   if (!extrinsics.empty()) {
     const data::CameraPose pose = data::load_camera_pose(extrinsics, given.accept_unusable);
     view.base_from_camera = pose.transform.T;
     for (const std::string& warning : pose.warnings) view.warnings.push_back(extrinsics + ": " + warning);
-  } else if (!clouds) {
-    throw data::input_error((fs::path(folder) / "extrinsics.json").string(), "file",
-                            "missing: depth images need the pose of their camera, here or as --extrinsics");
+    if (!clouds) take_lens(pose, extrinsics, given, view);
   }
   return view;
 }

@@ -37,5 +37,18 @@ TEST(ExtrinsicsExport, RosUrdfAndEasyHandeyeSayTheSameTransform) {
   }
 }
 
+TEST(ExtrinsicsExport, EachCarriesTheLensThatItsTransformHoldsWith) {
+  const data::NamedTransform transform{"base", "camera", make_pose({0.1, -0.2, 0.3}, {0.3, -0.8, 2})};
+  data::CameraIntrinsics lens = make_scene(protocol_settings(Setup::eye_to_hand), board_points(), 1).camera;
+  lens.cx += 1.0 / 3;
+  for (const std::string& text : {ros_static_transform(transform, lens), urdf_joint(transform, lens),
+                                  easy_handeye2(transform, Setup::eye_to_hand, lens)}) {
+    const auto read = data::find_lens_remark(text, "export");
+    ASSERT_TRUE(read) << text;
+    EXPECT_EQ(read->cx, lens.cx);
+    EXPECT_EQ(read->width, lens.width);
+  }
+}
+
 }  // namespace
 }  // namespace flash::calib

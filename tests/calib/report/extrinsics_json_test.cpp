@@ -65,5 +65,24 @@ TEST(ExtrinsicsJson, WhatItWasMadeFromIsSavedAndLoaded) {
   EXPECT_EQ(loaded.inputs.tip_link, "tool");
 }
 
+TEST(ExtrinsicsJson, TheLensIsAsStatedOnlyWhereItIs) {
+  const HandEyeScene scene = make_scene(protocol_settings(Setup::eye_in_hand), board_points(), 1);
+  data::CameraIntrinsics stated = scene.camera;
+  stated.cx += 3;
+  for (const bool kept : {false, true}) {
+    CalibrateSettings settings;
+    settings.lens = kept ? LensKnowledge::stated : LensKnowledge::near;
+    const Calibration result = calibrate(Setup::eye_in_hand, stated, scene.points,
+                                         grid_symmetries(scene.points), scene.observations, settings);
+    const nlohmann::ordered_json json = to_json(result, {"recording", "", "", "", ""}, 0);
+    EXPECT_EQ(json["lens"]["as_stated"], kept);
+    EXPECT_EQ(json["lens"]["solved"], !kept);
+    const data::TemporaryFolder folder;
+    const Extrinsics loaded = load_extrinsics(folder.write("camera.json", data::format_json(json)), true);
+    EXPECT_EQ(loaded.stated_lens->cx, stated.cx);
+    EXPECT_EQ(loaded.lens->cx, result.refined.bundle.intrinsics.front().cx);
+  }
+}
+
 }  // namespace
 }  // namespace flash::calib

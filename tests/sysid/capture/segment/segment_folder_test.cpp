@@ -118,6 +118,51 @@ TEST_F(SegmentFolder, CamerasThatCannotBeUsedAreRefusedUnlessAccepted) {
   EXPECT_EQ(segment_folder({accepted}, {0.0}, settings, folder("out")).warnings, said);
 }
 
+// The camera is seen with 160 px, and held to be one of 150 px, which puts the rim of the patch 7 mm off.
+TEST_F(SegmentFolder, AnotherLensThanThatOfTheExtrinsicsIsRefusedOrRightToAMillimetre) {
+  write_depth_view(folder("raw"), {0.1});
+  const auto calibrated = [&](double stated) {
+    std::ofstream(folder("raw") + "/extrinsics.json")
+        << R"({"schema": "flash-extrinsics/2", "transform": {"translation": [0.5, 0.1, 1.07],
+               "rotation_xyzw": [1, 0, 0, 0]}, "lens": {"size_px": [160, 120], "focal_px": [160, 160],
+               "centre_px": [79.5, 59.5], "distortion": [], "stated": {"focal_px": [)"
+        << stated << ", " << stated << R"(], "centre_px": [79.5, 59.5], "distortion": []}}})";
+  };
+  data::CameraIntrinsics other = small_camera();
+  other.fx = other.fy = 150;
+  data::save_camera_info(other, folder("raw") + "/camera_info.yaml");
+  calibrated(155);
+  EXPECT_EQ(
+      message_of([&] { open_raw_view(folder("raw")); }),
+      folder("raw") + "/camera_info.yaml: found fx 150.00, fy 150.00, cx 79.50, cy 59.50, but " +
+          folder("raw") +
+          "/extrinsics.json holds with fx 160.00, fy 160.00, cx 79.50, cy 59.50, up to 6.25 px from it: "
+          "expected one lens; --lens solved takes that of " +
+          folder("raw") + "/extrinsics.json, --lens stated the other");
+  const auto rim = [&](const RawViewFiles& given) {
+    std::size_t not_finite = 0;
+    const data::Points points = load_raw_frame(open_raw_view(folder("raw"), given), 0, true, not_finite);
+    double farthest = 0;
+    for (const auto& point : points.rowwise())
+      if (point.z() > 0.15) farthest = std::max(farthest, point.x() - camera_position.x());
+    return farthest;
+  };
+  // Of 160 px at 0.9 m, the outermost pixel within 0.1 m is 17.5 px from the axis.
+  const double right = 17.5 * 0.9 / 160;
+  RawViewFiles given;
+  given.lens = data::LensChoice::solved;
+  EXPECT_NEAR(rim(given), right, 1e-3);
+  given.lens = data::LensChoice::stated;
+  EXPECT_NEAR(rim(given), 17.5 * 0.9 / 150, 1e-3);
+  EXPECT_EQ(open_raw_view(folder("raw"), given).warnings.size(), 1u);
+  calibrated(150);  // the lens that the calibration began with
+  EXPECT_NEAR(rim({}), right, 1e-3);
+  EXPECT_EQ(open_raw_view(folder("raw")).warnings.size(), 1u);
+  fs::remove(folder("raw") + "/camera_info.yaml");
+  EXPECT_NEAR(rim({}), right, 1e-3);
+  EXPECT_TRUE(open_raw_view(folder("raw")).warnings.empty());
+}
+
 TEST_F(SegmentFolder, ViewsAreMergedFrameByFrame) {
   write_depth_view(folder("a"), {0.1});
   fs::create_directories(folder("b"));
