@@ -84,7 +84,7 @@ std::optional<calib::CloudCheck> check_clouds(const calib::Dataset& dataset,
     if (views[i].frame->depth.empty()) continue;
     calib::Observation observation = views[i].observation;
     observation.points = check.views[i].points;
-    clouds.push_back(calib::target_cloud(data::load_depth_image(views[i].frame->depth), dataset.depth_scale,
+    clouds.push_back(calib::target_cloud(data::load_depth(views[i].frame->depth, dataset.depth_scale),
                                          calib::load_grey_image(views[i].frame->image), lens, observation));
     poses.push_back(observation.T_base_gripper);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/frame_times.h"
+#include "data/depth_map.h"
 #include "data/error.h"
 #include "data/frame_files.h"
 #include "data/mesh_io.h"
@@ -190,7 +191,7 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
   if (options.clouds.empty() == options.depth.empty())
     throw data::InputError("import: expected either a folder of clouds or --depth");
   if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");
-  if (!options.depth.empty()) settings.depth = files_in(options.depth, {".png"}, "depth");
+  if (!options.depth.empty()) settings.depth = files_in(options.depth, data::depth_endings(), "depth");
   if (!options.trajectory.empty()) {
     settings.trajectory = load_gripper(options.trajectory);
     settings.trajectory_path = options.trajectory;

@@ -312,7 +312,8 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   CLI::Option* points =
       verb.add_flag("--points", options->points, "Take the vertices of a mesh alone, as a cloud");
-  verb.add_option("--intrinsics", options->frames.intrinsics, "Of depth frames: camera_info or OpenCV YAML");
+  verb.add_option("--intrinsics", options->frames.intrinsics,
+                  "Of depth frames: camera_info, OpenCV, camchain, JSON or npz");
   verb.add_option(
           "--lens", options->lens,
           "Where --extrinsics hold with another lens than --intrinsics: solved takes theirs, stated that "

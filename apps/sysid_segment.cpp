@@ -184,20 +184,20 @@ void add_segment_verb(CLI::App& app, Action& action) {
           "Folders of raw frames, one a camera: clouds, or depth/ with camera_info.yaml and extrinsics.json")
       ->required();
   verb->add_option("--trajectory", options->trajectory,
-                   "T_base_gripper, TUM or CSV: the arm above the gripper is cut away");
+                   "T_base_gripper over time, TUM, CSV or JSON: the arm above the gripper is cut away");
   verb->add_option("--times", options->times,
                    "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame");
   verb->add_option("--masks", options->masks, "Folder of masks of the depth images' names, one a view");
-  verb->add_option(
-      "--intrinsics", options->intrinsics,
-      "camera_info or OpenCV YAML, one a view or one for all; without it camera_info.yaml there");
+  verb->add_option("--intrinsics", options->intrinsics,
+                   "camera_info, OpenCV, camchain, JSON or npz, one a view or one for all; without it "
+                   "camera_info.yaml there");
   verb->add_option(
           "--lens", options->lens,
           "Where the extrinsics hold with another lens than the view's: solved takes theirs, stated the "
           "view's, a file that one; one a view or one for all. Without it such views are refused")
       ->type_name("stated|solved|FILE");
   verb->add_option("--extrinsics", options->extrinsics,
-                   "T_base_camera, one a view: the extrinsics of flash-calib, or a TUM file; without it "
+                   "T_base_camera, one a view: the extrinsics of flash-calib, or a file of poses; without it "
                    "extrinsics.json or .tum there");
   verb->add_option("--depth-scale", options->depth_scales,
                    "Metres per count of the depth images, one a view or one for all; without it 0.001")

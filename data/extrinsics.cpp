@@ -2,8 +2,10 @@
 
 #include <cmath>
 
+#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/pose_file.h"
 #include "data/text.h"
 #include "data/trajectory.h"
 
@@ -74,6 +76,17 @@ void read_lenses(const JsonObject& file, CameraPose& pose) {
 
 }  // namespace
 
+namespace {
+
+/// Of a trajectory, a list of poses, or a YAML file of one.
+Eigen::Isometry3d first_pose(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".yaml" || extension == ".yml" || extension == ".calib") return load_yaml_pose(path);
+  return is_tum(path) ? load_tum(path).poses.front() : load_pose_list(path).poses.front().pose;
+}
+
+}  // namespace
+
 std::string lens_remark(const CameraIntrinsics& lens) {
   const auto list = [](std::initializer_list<double> values) {
     std::string text;
@@ -123,14 +136,17 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
 
 CameraPose load_camera_pose(const std::string& path, bool accept_unusable) {
   CameraPose pose;
-  if (lower_extension(path) == ".json") {
-    const nlohmann::json json = load_json(path);
+  const std::string extension = lower_extension(path);
+  const bool json_file = extension == ".json";
+  const nlohmann::json json = json_file ? load_json(path) : nlohmann::json();
+  if (json.is_object() && (json.contains("schema") || !json.contains("poses"))) {
     const JsonObject file(json, path);
     if (file.string("setup", "") == "eye-in-hand")
       throw file.error("setup", "\"eye-to-hand\": this camera moves with the gripper");
     pose = read_camera_pose(file, accept_unusable);
   } else {
-    pose.transform = {.parent = "base", .child = "camera", .T = load_trajectory(path).poses.front()};
+    pose.transform = {.parent = "base", .child = "camera", .T = first_pose(path)};
+    if (!json_file) pose.lens = find_lens_remark(read_file(path), path);
   }
   constexpr double kFarthest = 20;  // from which no camera of a cell looks on [m]
   if (const double distance = pose.transform.T.translation().norm(); distance > kFarthest)

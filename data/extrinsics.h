@@ -30,8 +30,9 @@ struct CameraPose {
 /// InputError naming file, field, what was found and what was expected.
 CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable);
 
-/// T_base_camera of a camera that stands still, from such a file, or from a trajectory (any but .json) whose
-/// first pose counts. A camera on the gripper is refused too.
+/// T_base_camera of a camera that stands still: such a file; a trajectory or list of poses (load_pose_list),
+/// whose first pose counts; or one pose in YAML, as easy_handeye2's .calib. The lens is that of the file, or
+/// of a remark in it (lens_remark). A camera on the gripper is refused too.
 CameraPose load_camera_pose(const std::string& path, bool accept_unusable);
 
 /// The field "warnings" of a calibration, or of what was made with one; empty where it is absent.

@@ -10,9 +10,9 @@ namespace flash::data {
 
 /// Frames of depth of one thing that does not move, and where each was seen from.
 struct DepthFrames {
-  std::string folder;      ///< 16-bit .png, in order of name
+  std::string folder;      ///< as load_depth reads them, in order of name
   std::string masks;       ///< folder of masks of the same names; may be empty
-  std::string intrinsics;  ///< camera_info or OpenCV YAML; may be empty where extrinsics hold a lens
+  std::string intrinsics;  ///< as load_intrinsics reads it; may be empty where extrinsics hold a lens
   LensChoice lens = LensChoice::agreeing;
   std::string poses;       ///< T_world_camera, a pose a frame: TUM or CSV; or, of a camera that stands still,
   std::string extrinsics;  ///< as load_camera_pose reads it

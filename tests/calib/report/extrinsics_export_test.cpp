@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "tests/calib/hand_eye_scene.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
 namespace {
@@ -48,6 +49,12 @@ TEST(ExtrinsicsExport, EachCarriesTheLensThatItsTransformHoldsWith) {
     EXPECT_EQ(read->cx, lens.cx);
     EXPECT_EQ(read->width, lens.width);
   }
+  const data::TemporaryFolder folder;
+  const data::CameraPose pose = data::load_camera_pose(
+      folder.write("a.calib", easy_handeye2(transform, Setup::eye_to_hand, lens)), false);
+  EXPECT_LT((pose.transform.T.matrix() - transform.T.matrix()).norm(), 1e-7);  // nine digits
+  ASSERT_TRUE(pose.lens);
+  EXPECT_EQ(pose.lens->cx, lens.cx);
 }
 
 }  // namespace

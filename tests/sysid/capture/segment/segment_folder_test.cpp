@@ -163,6 +163,33 @@ TEST_F(SegmentFolder, AnotherLensThanThatOfTheExtrinsicsIsRefusedOrRightToAMilli
   EXPECT_TRUE(open_raw_view(folder("raw")).warnings.empty());
 }
 
+// Depth in metres as numpy writes it, a lens without the size of its pictures, and a bare 4 x 4 matrix.
+TEST_F(SegmentFolder, DepthLensAndPoseMayBeOfAllKindsThatFlashCalibReads) {
+  write_depth_view(folder("raw"), {0.1});
+  std::size_t not_finite = 0;
+  const data::Points expected = load_raw_frame(open_raw_view(folder("raw")), 0, true, not_finite);
+  const data::DepthImage counts = patch_above_table(0.1);
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (120, 160), }";
+  header.resize(117, ' ');
+  fs::create_directories(folder("other/depth"));
+  std::ofstream npy(folder("other/depth/0.npy"), std::ios::binary);
+  npy << std::string("\x93NUMPY\x01\x00\x76\x00", 10) << header << '\n';
+  for (const std::uint16_t count : counts.pixels) {
+    const float metres = 0.001F * static_cast<float>(count);
+    npy.write(reinterpret_cast<const char*>(&metres), sizeof metres);
+  }
+  npy.close();
+  std::ofstream(folder("other/lens.json"))
+      << R"({"mtx": [[160, 0, 79.5], [0, 160, 59.5], [0, 0, 1]], "dist": []})";
+  std::ofstream(folder("other/pose.txt")) << "1 0 0 0.5\n0 -1 0 0.1\n0 0 -1 1.07\n0 0 0 1\n";
+  RawViewFiles given;
+  given.intrinsics = folder("other/lens.json");
+  given.extrinsics = folder("other/pose.txt");
+  const data::Points points = load_raw_frame(open_raw_view(folder("other"), given), 0, true, not_finite);
+  ASSERT_EQ(points.rows(), expected.rows());
+  EXPECT_LT((points - expected).cwiseAbs().maxCoeff(), 1e-6);  // floats of a metre have 1e-7
+}
+
 TEST_F(SegmentFolder, ViewsAreMergedFrameByFrame) {
   write_depth_view(folder("a"), {0.1});
   fs::create_directories(folder("b"));
