@@ -15,6 +15,7 @@
 #include "calib/calibrate/calibrate_pairs.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/opencv_closed_forms.h"
+#include "calib/detect/lens_doubt.h"
 #include "calib/detect/read_depth.h"
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/extrinsics_json.h"
@@ -213,6 +214,8 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
                                        calib::read_depth(dataset, detections), settings);
     } catch (const data::InputError&) {
       if (!options.common.quiet) warn_of_left_out(detections);
+      const std::string doubt = calib::lens_doubt(dataset, target, detections);
+      if (!doubt.empty()) throw data::InputError(doubt);
       throw;
     }
   }

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -14,6 +15,7 @@
 #include "apps/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/calibrate/cell.h"
+#include "calib/detect/lens_doubt.h"
 #include "calib/detect/read_depth.h"
 #include "calib/report/cell_json.h"
 #include "data/atomic_file.h"
@@ -89,10 +91,16 @@ calib::CellMember member_of(const Recording& recording, const RegisterOptions& o
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = time_offset;
-  const calib::Calibration calibration =
-      calib::calibrate_images(kind, dataset, target, detections, calib::read_depth(dataset, detections),
-                              settings)
-          .calibration;
+  calib::Calibration calibration;
+  try {
+    calibration = calib::calibrate_images(kind, dataset, target, detections,
+                                          calib::read_depth(dataset, detections), settings)
+                      .calibration;
+  } catch (const data::InputError&) {
+    const std::string doubt = calib::lens_doubt(dataset, target, detections);
+    if (!doubt.empty()) throw data::InputError(doubt);
+    throw;
+  }
   if (!options.common.quiet) {
     const std::size_t all = calibration.views.size(), used = calibration.used.size();
     if (used < all)
@@ -261,6 +269,11 @@ calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
         doubts.refusals.push_back(options.calibrations[i] + ": " + first_of(calibrations[i].warnings));
     return composed;
   }
+  // What one was calibrated with counts for all: a size that is not known.
+  if (!options.target_size_sd && !options.size_as_stated &&
+      std::any_of(calibrations.begin(), calibrations.end(),
+                  [](const calib::Extrinsics& c) { return c.size_unknown; }))
+    options.target_size_sd = std::numeric_limits<double>::infinity();
   const bool for_arms = std::any_of(calibrations.begin(), calibrations.end(),
                                     [](const calib::Extrinsics& c) { return c.use == calib::Use::two_arms; });
   if (for_arms && options.lens.knowledge == calib::LensKnowledge::near) options.use = calib::Use::two_arms;

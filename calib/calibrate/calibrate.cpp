@@ -66,6 +66,12 @@ void expect_convention(Setup setup, const std::vector<Observation>& observations
       check_size(setup, observations, symmetries, stated, settings.convention);
   if (sized && (hopeless || !measurable_size(sized->size))) throw data::InputError(sized->sentence);
   if (!hopeless) return;
+  if (!stated.found)
+    throw data::InputError(
+        "robot and camera do not tell of the same motion: no three of " +
+        std::to_string(observations.size()) +
+        " views turn by the same angles, and no other convention explains them; check that each picture, or "
+        "pose of the target, stands beside the robot's pose of its moment");
   constexpr double kTurnsAgree = 1 * kDegree;
   char text[320];
   std::snprintf(
@@ -319,8 +325,8 @@ void warn(Calibration& result) {
     constexpr std::ptrdiff_t kBlunders = 10;  // one view in so many is a slip now and then
     if (misfits > 1 && misfits * kBlunders > std::ssize(result.views))
       sentence +=
-          ", too many for slips: an arm whose model is wrong loses good views, and then the stated "
-          "deviations are too small";
+          ", too many for slips: pictures of other poses, or good views lost by an arm whose model is wrong; "
+          "then the stated deviations are too small";
     result.warnings.push_back(std::move(sentence));
   }
   if (result.selection.renumbered > 0)

@@ -127,6 +127,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   if (object.has("scale")) {
     const data::JsonObject scale = object.object("scale");
     if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");
+    extrinsics.size_unknown = scale.boolean("solved", false) && !scale.has("prior_sd");
     if (scale.has("warp_mm")) extrinsics.target.warp = read_warp(scale);
   }
   if (object.has("edges")) extrinsics.edge_offset = object.object("edges").number("offset_px");

@@ -60,6 +60,11 @@ TEST(ExtrinsicsJson, WhatItWasMadeFromIsSavedAndLoaded) {
   EXPECT_EQ(loaded.inputs.time_offset->estimate, 0.03);
   EXPECT_TRUE(loaded.pixels);
   EXPECT_EQ(loaded.use, Use::two_arms);
+  EXPECT_FALSE(loaded.size_unknown);
+  nlohmann::ordered_json unknown = json;
+  unknown["scale"]["prior_sd"] = nullptr;  // as --target-size solved writes it
+  unknown["scale"]["solved"] = true;
+  EXPECT_TRUE(load_extrinsics(folder.write("unknown.json", data::format_json(unknown))).size_unknown);
   EXPECT_EQ(loaded.inputs.robot, "arm.urdf");
   EXPECT_EQ(loaded.inputs.base_link, "base");
   EXPECT_EQ(loaded.inputs.tip_link, "tool");
