@@ -15,6 +15,7 @@
 #include "calib/calibrate/calibrate_pairs.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/opencv_closed_forms.h"
+#include "calib/detect/lens_doubt.h"
 #include "calib/detect/read_depth.h"
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/extrinsics_json.h"
@@ -36,7 +37,7 @@ struct HandEyeOptions {
   std::string setup;
   calib::Use use = calib::Use::workspace;
   bool time_offset = false;
-  calib::LensKnowledge lens = calib::LensKnowledge::near;
+  LensOption lens;
   std::optional<double> target_size_sd = {};
   bool size_as_stated = false;
   std::string parent, child = "camera";
@@ -81,6 +82,23 @@ std::string with_deviation(double value, double sd) {
   return fixed(value, digits) + " +- " + fixed(sd, digits);
 }
 
+/// The lens that the answer holds with and, where it matters, how far off it would be with the stated one.
+void print_lens(const calib::Calibration& c) {
+  const calib::LensEstimate& lens = c.lens;
+  std::printf("lens:");
+  for (int i = 0; i < 4; ++i)
+    std::printf(" %s %s%s", calib::lens_unknown(i), with_deviation(lens.estimate[i], lens.sd[i]).c_str(),
+                i < 3 ? "," : " px");
+  std::printf(" (stated %.1f, %.1f, %.1f, %.1f)\n", lens.stated[0], lens.stated[1], lens.stated[2],
+              lens.stated[3]);
+  const calib::Vector6d& shift = lens.camera_shift;
+  if (calib::exceeds_deviations(c.poses.X, shift, c.covariance))
+    std::printf(
+        "  this answer holds with this lens alone: with the stated one the camera would be %.1f mm and %.2f "
+        "deg from here (--camera-info writes this lens, --lens stated keeps the other)\n",
+        1e3 * shift.head<3>().norm(), shift.tail<3>().norm() * 180 / M_PI);
+}
+
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   const Eigen::Vector3d t = extrinsics.transform.T.translation();
   constexpr double kDegrees = 180 / M_PI;
@@ -102,9 +120,7 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
               corners.c_str(), kDegrees * extrinsics.robot_rotation_rad,
               1e3 * extrinsics.robot_translation_m);
   if (extrinsics.pixels) {
-    std::printf("lens: focal lengths %s, %s px (stated %.1f, %.1f)\n",
-                with_deviation(c.lens.estimate[0], c.lens.sd[0]).c_str(),
-                with_deviation(c.lens.estimate[1], c.lens.sd[1]).c_str(), c.lens.stated[0], c.lens.stated[1]);
+    print_lens(c);
     const calib::Warp warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
     std::printf(
         "target: %.4f +- %.4f times as large as stated, its middle %s +- %.2f and %s +- %.2f mm behind "
@@ -198,6 +214,8 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
                                        calib::read_depth(dataset, detections), settings);
     } catch (const data::InputError&) {
       if (!options.common.quiet) warn_of_left_out(detections);
+      const std::string doubt = calib::lens_doubt(dataset, target, detections);
+      if (!doubt.empty()) throw data::InputError(doubt);
       throw;
     }
   }
@@ -222,7 +240,9 @@ void expect_frame_names(const std::string& parent, const std::string& child) {
                            '"');
 }
 
-int run_handeye(const HandEyeOptions& options) {
+int run_handeye(HandEyeOptions options) {
+  expect_no_camera(options.lens, options.dataset.camera);
+  if (!options.lens.own.empty()) options.dataset.camera = options.lens.own;
   const std::string report = report_path(options);
   const std::vector<std::string> outputs = {
       options.out, report, options.ros, options.urdf, options.easy_handeye2, options.camera_info};
@@ -237,7 +257,7 @@ int run_handeye(const HandEyeOptions& options) {
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
   settings.use = options.use;
-  settings.lens = options.lens;
+  settings.lens = options.lens.knowledge;
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.closed_forms = calib::opencv_closed_forms();
   settings.target_size_sd = options.target_size_sd;
@@ -268,9 +288,9 @@ int run_handeye(const HandEyeOptions& options) {
     std::vector<data::FileText> files = {
         {options.out, text},
         {report, html},
-        {options.ros, calib::ros_static_transform(extrinsics.transform)},
-        {options.urdf, calib::urdf_joint(extrinsics.transform)},
-        {options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup)}};
+        {options.ros, calib::ros_static_transform(extrinsics.transform, extrinsics.lens)},
+        {options.urdf, calib::urdf_joint(extrinsics.transform, extrinsics.lens)},
+        {options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup, extrinsics.lens)}};
     if (extrinsics.pixels)
       files.push_back({options.camera_info,
                        data::camera_info_text(solved.calibration.refined.bundle.intrinsics.front())});
@@ -305,7 +325,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
           "with the lens as stated for all alike")
       ->check(CLI::IsMember({"workspace", "image", "two-arms"}))
       ->default_str("workspace");
-  add_lens_options(*verb, options->lens);
+  add_lens_option(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd, options->size_as_stated);
   verb->add_flag(
       "--time-offset", options->time_offset,

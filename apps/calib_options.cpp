@@ -80,14 +80,22 @@ void add_target_size_options(CLI::App& verb, std::optional<double>& sd, bool& as
       ->check(CLI::IsMember({"stated", "solved"}));
 }
 
-void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens) {
-  CLI::Option* refine = verb.add_flag_callback(
-      "--refine-intrinsics", [&lens] { lens = calib::LensKnowledge::unknown; },
-      "Solve for the lens with nothing known of it beforehand");
-  verb.add_flag_callback(
-          "--stated-intrinsics", [&lens] { lens = calib::LensKnowledge::stated; },
-          "Keep the lens as it is stated, to the last digit")
-      ->excludes(refine);
+void add_lens_option(CLI::App& verb, LensOption& lens) {
+  verb.add_option_function<std::string>(
+          "--lens",
+          [&lens](const std::string& word) {
+            lens.knowledge = word == "solved" ? calib::LensKnowledge::unknown : calib::LensKnowledge::stated;
+            if (word != "solved" && word != "stated") lens.own = word;
+          },
+          "stated: the dataset's, kept to the last digit; solved: nothing is known of it beforehand; a file: "
+          "that lens, kept to the last digit. Without it the lens is solved for, near to the dataset's")
+      ->type_name("stated|solved|FILE");
+}
+
+void expect_no_camera(const LensOption& lens, const std::string& camera) {
+  if (!lens.own.empty() && !camera.empty())
+    throw data::InputError("--lens: found " + lens.own + ", expected stated or solved beside --camera " +
+                           camera);
 }
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {

@@ -46,8 +46,15 @@ void add_robot_options(CLI::App& group, DatasetChoice& choice);
 /// --target-size-sd, --target-size stated|solved
 void add_target_size_options(CLI::App& verb, std::optional<double>& sd, bool& as_stated);
 
-/// --stated-intrinsics, --refine-intrinsics
-void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens);
+/// --lens: what is known of the lens, and a file of one's own in place of the dataset's; else empty.
+struct LensOption {
+  calib::LensKnowledge knowledge = calib::LensKnowledge::near;
+  std::string own = {};
+};
+void add_lens_option(CLI::App& verb, LensOption& lens);
+
+/// Throws data::InputError where --lens and --camera both name a file.
+void expect_no_camera(const LensOption& lens, const std::string& camera);
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
 

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -14,11 +15,13 @@
 #include "apps/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/calibrate/cell.h"
+#include "calib/detect/lens_doubt.h"
 #include "calib/detect/read_depth.h"
 #include "calib/report/cell_json.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/posed_lens.h"
 #include "data/text.h"
 #include "data/writable.h"
 
@@ -36,7 +39,8 @@ struct RegisterOptions {
   DatasetChoice robot;  ///< of the datasets of --cameras: its URDF alone
   double depth_scale = 0.001;
   bool without_images = false, no_depth = false;
-  calib::LensKnowledge lens = calib::LensKnowledge::near;
+  LensOption lens;
+  calib::Use use = calib::Use::workspace;
   std::optional<double> target_size_sd = {};
   bool size_as_stated = false;
   std::string out;
@@ -82,14 +86,21 @@ calib::CellMember member_of(const Recording& recording, const RegisterOptions& o
   calib::CalibrateSettings settings;
   settings.target_size_sd = options.target_size_sd;
   settings.size_as_stated = options.size_as_stated;
-  settings.lens = options.lens;
+  settings.use = options.use;
+  settings.lens = options.lens.knowledge;
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = time_offset;
-  const calib::Calibration calibration =
-      calib::calibrate_images(kind, dataset, target, detections, calib::read_depth(dataset, detections),
-                              settings)
-          .calibration;
+  calib::Calibration calibration;
+  try {
+    calibration = calib::calibrate_images(kind, dataset, target, detections,
+                                          calib::read_depth(dataset, detections), settings)
+                      .calibration;
+  } catch (const data::InputError&) {
+    const std::string doubt = calib::lens_doubt(dataset, target, detections);
+    if (!doubt.empty()) throw data::InputError(doubt);
+    throw;
+  }
   if (!options.common.quiet) {
     const std::size_t all = calibration.views.size(), used = calibration.used.size();
     if (used < all)
@@ -163,7 +174,7 @@ std::vector<Recording> recordings_of_arms(const std::vector<std::string>& arms,
     try {
       choice.path = calib::resolved(inputs.dataset, file);
       choice.poses = calib::resolved(inputs.poses, file);
-      choice.camera = calib::resolved(inputs.camera, file);
+      choice.camera = options.lens.own.empty() ? calib::resolved(inputs.camera, file) : options.lens.own;
     } catch (const data::InputError& error) {
       throw data::InputError(std::string(error.what()) + "; --without-images composes the transforms alone");
     }
@@ -199,6 +210,19 @@ std::vector<Recording> recordings_of_cameras(const RegisterOptions& options) {
   return recordings;
 }
 
+/// A camera has one lens, whatever arm it sees.
+void expect_one_lens(const std::vector<Recording>& recordings) {
+  for (std::size_t i = 0; i < recordings.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const calib::Dataset &one = recordings[j].dataset, &other = recordings[i].dataset;
+      if (recordings[i].camera != recordings[j].camera || data::same_lens(*one.camera, *other.camera))
+        continue;
+      throw data::InputError(other.camera_path + ": found " + data::describe_lens(*other.camera) + ", but " +
+                             one.camera_path + ": " + data::describe_lens(*one.camera) +
+                             ": expected one lens of the one camera; --lens FILE takes that one for all");
+    }
+}
+
 /// All recordings are read before the first is solved: the result must not take the place of one.
 calib::Cell solved_cell(std::vector<Recording> recordings, const RegisterOptions& options, Doubts& doubts) {
   std::vector<std::string> read = options.calibrations;
@@ -208,12 +232,29 @@ calib::Cell solved_cell(std::vector<Recording> recordings, const RegisterOptions
     read.insert(read.end(), files.begin(), files.end());
   }
   expect_own_files({options.out}, read);
+  expect_one_lens(recordings);
   std::vector<calib::CellMember> members;
   for (const Recording& recording : recordings) members.push_back(member_of(recording, options, doubts));
-  return calib::solve_cell(members, {.refine = {},
-                                     .target_size_sd = options.target_size_sd,
-                                     .size_as_stated = options.size_as_stated,
-                                     .lens = options.lens});
+  return calib::solve_cell(
+      members,
+      {.refine = {},
+       .target_size_sd = options.target_size_sd,
+       .size_as_stated = options.size_as_stated,
+       .lens = options.use == calib::Use::two_arms ? calib::LensKnowledge::stated : options.lens.knowledge});
+}
+
+/// Where transforms are composed, each holds with a lens of its own.
+void warn_of_lenses(const std::vector<std::string>& files, const std::vector<calib::Extrinsics>& calibrations,
+                    Doubts& doubts) {
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    const auto &first = calibrations.front().lens, &other = calibrations[i].lens;
+    if (!first || !other || data::same_lens(*first, *other)) continue;
+    doubts.add(files[i],
+               {"holds with " + data::describe_lens(*other) + ", but " + files.front() + " with " +
+                data::describe_lens(*first) +
+                ": the camera's place differs between them by as much; without --without-images one "
+                "lens is taken for both"});
+  }
 }
 
 calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
@@ -222,14 +263,20 @@ calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
   const std::vector<calib::Extrinsics> calibrations = load_calibrations(options, doubts);
   const calib::Cell composed = calib::compose_cell(arms, calibrations);
   if (options.without_images) {
+    warn_of_lenses(options.calibrations, calibrations, doubts);
     for (std::size_t i = 0; i < calibrations.size(); ++i)
       if (!calibrations[i].usable)
         doubts.refusals.push_back(options.calibrations[i] + ": " + first_of(calibrations[i].warnings));
     return composed;
   }
+  // What one was calibrated with counts for all: a size that is not known.
+  if (!options.target_size_sd && !options.size_as_stated &&
+      std::any_of(calibrations.begin(), calibrations.end(),
+                  [](const calib::Extrinsics& c) { return c.size_unknown; }))
+    options.target_size_sd = std::numeric_limits<double>::infinity();
   const bool for_arms = std::any_of(calibrations.begin(), calibrations.end(),
                                     [](const calib::Extrinsics& c) { return c.use == calib::Use::two_arms; });
-  if (for_arms && options.lens == calib::LensKnowledge::near) options.lens = calib::LensKnowledge::stated;
+  if (for_arms && options.lens.knowledge == calib::LensKnowledge::near) options.use = calib::Use::two_arms;
   return solved_cell(recordings_of_arms(arms, calibrations, options), options, doubts);
 }
 
@@ -264,6 +311,9 @@ int run_register(const RegisterOptions& options) {
         "register: expected either two or more extrinsics files or --cameras with datasets");
   expect_different(options.calibrations);
   expect_different(options.cameras);
+  if (!options.lens.own.empty() && (options.without_images || !options.cameras.empty()))
+    throw data::InputError("--lens: found " + options.lens.own + ", expected stated or solved" +
+                           (options.cameras.empty() ? "" : ": each of --cameras has a lens of its own"));
   if (options.calibrations.size() + options.cameras.size() < 2)
     throw data::InputError("register: found one calibration, expected two or more");
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
@@ -315,7 +365,7 @@ void add_register_verb(CLI::App& app, Action& action) {
   add_vector_option(*verb, "--workspace", options->workspace,
                     "Point in the first base where the uncertainty is stated [m]");
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
-  add_lens_options(*verb, options->lens);
+  add_lens_option(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd, options->size_as_stated);
   verb->add_option("--depth-scale", options->depth_scale,
                    "Metres per count of the depth pictures of --cameras")

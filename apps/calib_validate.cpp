@@ -17,6 +17,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/posed_lens.h"
 #include "data/writable.h"
 
 namespace flash {
@@ -28,6 +29,7 @@ struct ValidateOptions {
   CalibCommonOptions common;
   DatasetChoice dataset;
   std::string extrinsics;
+  std::string lens;  ///< "stated", "solved", a file; empty: they have to agree
   bool refit_target = false;
   std::string out;
 };
@@ -73,6 +75,7 @@ void draw_views(const std::vector<ValidatedView>& views, const calib::Projection
 
 std::optional<calib::CloudCheck> check_clouds(const calib::Dataset& dataset,
                                               const calib::Extrinsics& extrinsics,
+                                              const data::CameraIntrinsics& lens,
                                               const std::vector<ValidatedView>& views,
                                               const calib::ProjectionCheck& check) {
   std::vector<calib::TargetCloud> clouds;
@@ -81,9 +84,8 @@ std::optional<calib::CloudCheck> check_clouds(const calib::Dataset& dataset,
     if (views[i].frame->depth.empty()) continue;
     calib::Observation observation = views[i].observation;
     observation.points = check.views[i].points;
-    clouds.push_back(calib::target_cloud(data::load_depth_image(views[i].frame->depth), dataset.depth_scale,
-                                         calib::load_grey_image(views[i].frame->image), *dataset.camera,
-                                         observation));
+    clouds.push_back(calib::target_cloud(data::load_depth(views[i].frame->depth, dataset.depth_scale),
+                                         calib::load_grey_image(views[i].frame->image), lens, observation));
     poses.push_back(observation.T_base_gripper);
   }
   if (clouds.empty()) return std::nullopt;
@@ -160,7 +162,23 @@ std::vector<std::string> files_written(const calib::Dataset& dataset, const std:
   return {files.begin(), files.end()};
 }
 
-int run_validate(const ValidateOptions& options) {
+/// That which the calibration holds with, else the dataset's; of pairs none.
+data::PosedLens lens_of(const calib::Extrinsics& extrinsics, const calib::Dataset& dataset,
+                        const ValidateOptions& options, data::LensChoice choice) {
+  if (!dataset.camera) return {};
+  const data::CameraPose pose{.transform = extrinsics.transform,
+                              .lens = extrinsics.lens,
+                              .stated = extrinsics.stated_lens,
+                              .warnings = {}};
+  return data::posed_lens(pose, options.extrinsics, data::LensOfFile{*dataset.camera, dataset.camera_path},
+                          choice);
+}
+
+int run_validate(ValidateOptions options) {
+  std::string own;
+  const data::LensChoice choice = data::parse_lens_choice(options.lens, own);
+  expect_no_camera({.own = own}, options.dataset.camera);
+  if (!own.empty()) options.dataset.camera = own;
   if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.common.force);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
@@ -177,12 +195,9 @@ int run_validate(const ValidateOptions& options) {
 
   std::vector<calib::Observation> observations;
   for (const ValidatedView& view : views) observations.push_back(view.observation);
-  const bool same_size = extrinsics.lens && dataset.camera &&
-                         extrinsics.lens->width == dataset.camera->width &&
-                         extrinsics.lens->height == dataset.camera->height;
-  // The calibration knows its lens better than the file that it started from.
-  const data::CameraIntrinsics lens =
-      same_size ? *extrinsics.lens : dataset.camera.value_or(data::CameraIntrinsics{});
+  const data::PosedLens posed = lens_of(extrinsics, dataset, options, choice);
+  if (!posed.notice.empty()) warn_calib(posed.notice);
+  const data::CameraIntrinsics& lens = posed.lens;
   if (!pairs)
     observations = calib::with_poses_for(lens, target, extrinsics.target, std::move(observations),
                                          extrinsics.edge_offset);
@@ -200,7 +215,7 @@ int run_validate(const ValidateOptions& options) {
   const int exit_code = !contradiction.sentence.empty() || !extrinsics.usable ? exit_unusable : exit_done;
 
   const std::optional<calib::CloudCheck> clouds =
-      pairs ? std::nullopt : check_clouds(dataset, extrinsics, views, check);
+      pairs ? std::nullopt : check_clouds(dataset, extrinsics, lens, views, check);
   const std::string text =
       data::format_json(result_json(options, warnings, check, !pairs, clouds, exit_code)) + '\n';
   if (!options.out.empty()) {
@@ -234,6 +249,11 @@ void add_validate_verb(CLI::App& app, Action& action) {
       "Project the target through robot and calibration; lay the clouds of all views on each other");
   add_dataset_options(*verb, options->dataset);
   verb->add_option("--extrinsics", options->extrinsics, "What flash-calib handeye has written")->required();
+  verb->add_option(
+          "--lens", options->lens,
+          "Where the calibration holds with another lens than the dataset's: solved takes that of the "
+          "calibration, stated the dataset's, a file that one. Without it such sets are refused")
+      ->type_name("stated|solved|FILE");
   verb->add_flag("--refit-target", options->refit_target,
                  "The target stands elsewhere than at the calibration");
   verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/frame_times.h"
+#include "data/depth_map.h"
 #include "data/error.h"
 #include "data/frame_files.h"
 #include "data/mesh_io.h"
@@ -190,7 +191,7 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
   if (options.clouds.empty() == options.depth.empty())
     throw data::InputError("import: expected either a folder of clouds or --depth");
   if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");
-  if (!options.depth.empty()) settings.depth = files_in(options.depth, {".png"}, "depth");
+  if (!options.depth.empty()) settings.depth = files_in(options.depth, data::depth_endings(), "depth");
   if (!options.trajectory.empty()) {
     settings.trajectory = load_gripper(options.trajectory);
     settings.trajectory_path = options.trajectory;
@@ -203,8 +204,13 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
         !gap.empty())
       throw data::InputError("--times: found none, but " + gap +
                              ": expected a CSV file with the time of each frame that is there");
-  if (!options.depth.empty() && (settings.intrinsics.empty() || settings.extrinsics.empty()))
-    throw data::InputError("import: --depth needs --intrinsics and --extrinsics");
+  if (!options.depth.empty() && settings.extrinsics.empty())
+    throw data::InputError("import: --depth needs --extrinsics, and --intrinsics where these hold no lens");
+  std::string own;
+  settings.lens = data::parse_lens_choice(options.lens, own);
+  if (!own.empty() && !settings.intrinsics.empty())
+    throw data::InputError("--lens: found " + own + ", expected stated or solved beside --intrinsics");
+  if (!own.empty()) settings.intrinsics = own;
 }
 
 }  // namespace flash

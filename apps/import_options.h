@@ -9,13 +9,14 @@ namespace flash {
 
 /// Options of `import` whose texts become values, as on the command line; empty where they are not given.
 struct ImportOptions {
-  std::string clouds;               ///< folder of .ply or .pcd, taken in order of name, 2 before 10; or
-  std::string depth;                ///< folder of .png
-  std::string trajectory;           ///< T_base_gripper, TUM or CSV; empty: that of segment.json
-  std::string times;                ///< as frame_times reads them; empty: those of segment.json
-  std::string mesh;                 ///< mesh spec or file
-  std::string grasp = "corner";     ///< as parse_grasp reads it
-  std::optional<double> within;     ///< of the grasp [m]; empty: 0.02
+  std::string clouds;            ///< folder of .ply or .pcd, taken in order of name, 2 before 10; or
+  std::string depth;             ///< folder of .png
+  std::string lens;              ///< of depth images: "stated", "solved", a file; empty: they have to agree
+  std::string trajectory;        ///< T_base_gripper, TUM or CSV; empty: that of segment.json
+  std::string times;             ///< as frame_times reads them; empty: those of segment.json
+  std::string mesh;              ///< mesh spec or file
+  std::string grasp = "corner";  ///< as parse_grasp reads it
+  std::optional<double> within;  ///< of the grasp [m]; empty: 0.02
   std::array<std::string, 3> crop;  ///< along x, y and z "LOW:HIGH" [m], either side may be empty
 };
 

@@ -32,6 +32,7 @@ struct MeshOptions {
   std::string input, out, flat;
   data::ScanSettings scan;
   data::DepthFrames frames;
+  std::string lens;  ///< of depth frames: "stated", "solved", a file; empty: they have to agree
   double scale = 1;
   bool points = false, tets = false, weld = false, json = false, force = false;
 };
@@ -39,15 +40,20 @@ struct MeshOptions {
 std::string millimetres(double metres) { return data::format_short(1000 * metres) + " mm"; }
 std::string percent(double share) { return data::format_short(100 * share) + " %"; }
 
-/// The scan in metres; without triangles it is a cloud.
-data::Geometry load(const MeshOptions& options, std::size_t& left_out) {
+bool are_depth_frames(const MeshOptions& options) {
+  const data::DepthFrames& frames = options.frames;
+  return !(frames.intrinsics + frames.poses + frames.extrinsics).empty();
+}
+
+/// The scan in metres; without triangles it is a cloud. `notice` becomes what its lens has to say.
+data::Geometry load(const MeshOptions& options, std::size_t& left_out, std::string& notice) {
   data::Geometry scan;
   if (!std::filesystem::is_directory(options.input))
     scan = data::load_scan(options.input, left_out);
-  else if (options.frames.intrinsics.empty())
-    scan.points = data::fused_clouds(options.input, left_out);
+  else if (are_depth_frames(options))
+    scan.points = data::fused_depth(options.frames, options.force, notice);
   else
-    scan.points = data::fused_depth(options.frames, options.force);
+    scan.points = data::fused_clouds(options.input, left_out);
   scan.points *= options.scale;
   if (options.points) scan.triangles.resize(0, 3);
   return scan;
@@ -126,12 +132,14 @@ nlohmann::ordered_json json_of(const MeshOptions& options, const data::ScannedSu
 
 int mesh_sheet(const MeshOptions& options) {
   std::size_t left_out = 0;
-  const data::Geometry scan = load(options, left_out);
+  std::string lens_notice;
+  const data::Geometry scan = load(options, left_out, lens_notice);
   const data::ScannedSurface sheet =
       scan.triangles.rows() > 0
           ? data::mesh_of_surface({scan.points, scan.triangles}, options.scan, options.input)
           : data::mesh_of_cloud(scan.points, options.scan, options.input);
   std::vector<std::string> warnings = warnings_of(sheet, left_out);
+  if (!lens_notice.empty()) warnings.push_back(lens_notice);
   std::vector<data::FileText> files = {{options.out, data::format_triangle_mesh(sheet.mesh, options.out)}};
   std::optional<data::FlatShape> flat;
   int exit_code = exit_done;
@@ -233,11 +241,23 @@ int mesh_welded(const MeshOptions& options) {
   return exit_done;
 }
 
-int mesh(const MeshOptions& options) {
-  if (!options.frames.intrinsics.empty() && options.frames.poses.empty() == options.frames.extrinsics.empty())
+/// The lens of depth frames, and where they were seen from.
+void read_lens(MeshOptions& options) {
+  data::DepthFrames& frames = options.frames;
+  std::string own;
+  frames.lens = data::parse_lens_choice(options.lens, own);
+  if (!own.empty() && !frames.intrinsics.empty())
+    throw data::InputError("--lens: found " + own + ", expected stated or solved beside --intrinsics");
+  if (!own.empty()) frames.intrinsics = own;
+  if (!are_depth_frames(options)) return;
+  if (frames.poses.empty() == frames.extrinsics.empty())
     throw data::InputError("--intrinsics: depth frames need one of --poses and --extrinsics");
-  if (options.frames.intrinsics.empty() && !(options.frames.poses + options.frames.extrinsics).empty())
-    throw data::InputError("--poses and --extrinsics: are for depth frames, which need --intrinsics");
+  if (frames.intrinsics.empty() && !frames.poses.empty())
+    throw data::InputError("--poses: are for depth frames, which need --intrinsics");
+}
+
+int mesh(MeshOptions options) {
+  read_lens(options);
   data::check_file_free(options.out, options.force);
   if (options.weld) return mesh_welded(options);
   if (options.tets) {
@@ -292,7 +312,13 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   CLI::Option* points =
       verb.add_flag("--points", options->points, "Take the vertices of a mesh alone, as a cloud");
-  verb.add_option("--intrinsics", options->frames.intrinsics, "Of depth frames: camera_info or OpenCV YAML");
+  verb.add_option("--intrinsics", options->frames.intrinsics,
+                  "Of depth frames: camera_info, OpenCV, camchain, JSON or npz");
+  verb.add_option(
+          "--lens", options->lens,
+          "Where --extrinsics hold with another lens than --intrinsics: solved takes theirs, stated that "
+          "of --intrinsics, a file that one. Without it such files are refused")
+      ->type_name("stated|solved|FILE");
   verb.add_option("--poses", options->frames.poses,
                   "Of depth frames: T_world_camera, a pose a frame (TUM, CSV)");
   verb.add_option("--extrinsics", options->frames.extrinsics,

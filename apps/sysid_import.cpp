@@ -130,20 +130,28 @@ void add_import_verb(CLI::App& app, Action& action) {
   CLI::Option* clouds =
       verb->add_option("clouds", texts.clouds, "Folder of .ply or .pcd, base frame [m], in order of name");
   CLI::Option* depth =
-      verb->add_option("--depth", texts.depth, "Folder of 16-bit depth PNG, in place of clouds")
+      verb->add_option("--depth", texts.depth,
+                       "Folder of depth images, 16-bit .png or .npy or .tiff in metres, in place of clouds")
           ->excludes(clouds);
   verb->add_option("--masks", settings.masks, "Folder of masks of the same names")->needs(depth);
-  verb->add_option("--intrinsics", settings.intrinsics, "Lens of the camera: camera_info or OpenCV YAML")
+  verb->add_option("--intrinsics", settings.intrinsics,
+                   "Lens of the camera: camera_info, OpenCV, camchain, JSON, npz")
       ->needs(depth);
   verb->add_option("--extrinsics", settings.extrinsics,
-                   "T_base_camera: the extrinsics of flash-calib, or a TUM file")
+                   "T_base_camera: the extrinsics of flash-calib, or a file of poses whose first counts")
       ->needs(depth);
+  verb->add_option(
+          "--lens", texts.lens,
+          "Where --extrinsics hold with another lens than --intrinsics: solved takes theirs, stated that "
+          "of --intrinsics, a file that one. Without it such files are refused")
+      ->needs(depth)
+      ->type_name("stated|solved|FILE");
   verb->add_option("--depth-scale", settings.depth_scale, "Metres per count of the depth images")
       ->check(positive_number())
       ->capture_default_str();
-  CLI::Option* trajectory = verb->add_option(
-      "--trajectory", texts.trajectory,
-      "Poses of the gripper, T_base_gripper, TUM or CSV; without it as the clouds were segmented");
+  CLI::Option* trajectory = verb->add_option("--trajectory", texts.trajectory,
+                                             "Poses of the gripper over time, T_base_gripper: TUM, CSV or "
+                                             "JSON; without it as the clouds were segmented");
   sysid::TrackImportSettings& tracks = options->tracks;
   CLI::Option* markers = verb->add_option("--markers", tracks.tracks,
                                           "Tracks of markers on a part that is clamped, in place of clouds: "

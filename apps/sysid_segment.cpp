@@ -31,6 +31,7 @@ struct SegmentOptions {
   CommonOptions common;
   std::vector<std::string> views;
   std::vector<std::string> masks, intrinsics, extrinsics;  ///< none, or one a view; lenses also one for all
+  std::vector<std::string> lens;                           ///< words or files, likewise
   std::vector<double> depth_scales;
   std::string trajectory, times;
   double table_height = 0;
@@ -52,6 +53,17 @@ Value of_view(const std::vector<Value>& values, std::size_t view, std::size_t vi
                          (views == 1 ? " for the one view" : ", one a view"));
 }
 
+/// Of one view, "stated", "solved", a file or nothing.
+void take_lens(const std::string& word, sysid::RawViewFiles& files) {
+  std::string own;
+  files.lens = data::parse_lens_choice(word, own);
+  if (own.empty()) return;
+  if (!files.intrinsics.empty())
+    throw data::InputError("--lens: found " + own + ", expected stated or solved beside --intrinsics " +
+                           files.intrinsics);
+  files.intrinsics = own;
+}
+
 std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
   std::vector<sysid::RawView> views;
   const std::size_t count = options.views.size();
@@ -60,6 +72,7 @@ std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
     const std::string none;
     files.masks = of_view(options.masks, view, count, false, "--masks", none);
     files.intrinsics = of_view(options.intrinsics, view, count, true, "--intrinsics", none);
+    take_lens(of_view(options.lens, view, count, true, "--lens", none), files);
     files.extrinsics = of_view(options.extrinsics, view, count, false, "--extrinsics", none);
     const double scale = of_view(options.depth_scales, view, count, true, "--depth-scale", 0.0);
     if (scale > 0) files.depth_scale = scale;
@@ -69,6 +82,8 @@ std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
   const bool clouds = std::none_of(views.begin(), views.end(), [](const auto& view) { return view.camera; });
   if (clouds && !options.depth_scales.empty())
     throw data::InputError("--depth-scale: the views hold clouds, expected depth images");
+  if (clouds && !options.lens.empty())
+    throw data::InputError("--lens: the views hold clouds, expected depth images");
   return views;
 }
 
@@ -169,15 +184,20 @@ void add_segment_verb(CLI::App& app, Action& action) {
           "Folders of raw frames, one a camera: clouds, or depth/ with camera_info.yaml and extrinsics.json")
       ->required();
   verb->add_option("--trajectory", options->trajectory,
-                   "T_base_gripper, TUM or CSV: the arm above the gripper is cut away");
+                   "T_base_gripper over time, TUM, CSV or JSON: the arm above the gripper is cut away");
   verb->add_option("--times", options->times,
                    "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame");
   verb->add_option("--masks", options->masks, "Folder of masks of the depth images' names, one a view");
+  verb->add_option("--intrinsics", options->intrinsics,
+                   "camera_info, OpenCV, camchain, JSON or npz, one a view or one for all; without it "
+                   "camera_info.yaml there");
   verb->add_option(
-      "--intrinsics", options->intrinsics,
-      "camera_info or OpenCV YAML, one a view or one for all; without it camera_info.yaml there");
+          "--lens", options->lens,
+          "Where the extrinsics hold with another lens than the view's: solved takes theirs, stated the "
+          "view's, a file that one; one a view or one for all. Without it such views are refused")
+      ->type_name("stated|solved|FILE");
   verb->add_option("--extrinsics", options->extrinsics,
-                   "T_base_camera, one a view: the extrinsics of flash-calib, or a TUM file; without it "
+                   "T_base_camera, one a view: the extrinsics of flash-calib, or a file of poses; without it "
                    "extrinsics.json or .tum there");
   verb->add_option("--depth-scale", options->depth_scales,
                    "Metres per count of the depth images, one a view or one for all; without it 0.001")

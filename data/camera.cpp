@@ -1,7 +1,5 @@
 #include "data/camera.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -11,22 +9,12 @@
 #include "data/camera_info.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "data/yaml_file.h"
 
 namespace flash::data {
 namespace {
 
 constexpr double kMostPixels = 1e6;  // a tele lens of 0.1 deg, or a centre far beside the picture
-
-YAML::Node load_yaml(const std::string& path) {
-  std::string text = read_file(path);
-  // OpenCV's first line, "%YAML:1.0", is not the directive that YAML defines.
-  if (text.starts_with("%YAML:")) text.erase(0, text.find('\n'));
-  try {
-    return YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    throw InputError(path + ": not valid YAML: line " + std::to_string(error.mark.line + 1));
-  }
-}
 
 /// The first of the names that the file has.
 std::pair<std::string, YAML::Node> find(const YAML::Node& file, std::initializer_list<const char*> names) {

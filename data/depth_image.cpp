@@ -93,35 +93,4 @@ void save_mask(const MaskImage& image, const std::string& path) {
   save_png(image.width, image.height, 8, image.pixels, path);
 }
 
-Points points_from_depth(const DepthImage& depth, const MaskImage& mask, const CameraIntrinsics& camera,
-                         double depth_scale, const std::string& source) {
-  const auto size = [](int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  };
-  if (depth.width != camera.width || depth.height != camera.height)
-    throw InputError(source + ": found " + size(depth.width, depth.height) +
-                     " pixels, expected the camera's " + size(camera.width, camera.height));
-  if (!mask.pixels.empty() && (mask.width != depth.width || mask.height != depth.height))
-    throw InputError(source + ": its mask has " + size(mask.width, mask.height) + " pixels, expected " +
-                     size(depth.width, depth.height));
-  constexpr double farthest = 1e5;  // nothing that a depth camera sees [m]
-  std::size_t lost = 0;
-  std::vector<double> coordinates;
-  for (int y = 0; y < depth.height; ++y)
-    for (int x = 0; x < depth.width; ++x) {
-      if (depth.at(x, y) == 0 || (!mask.pixels.empty() && mask.at(x, y) == 0)) continue;
-      const Eigen::Vector3d point = unproject(camera, {x, y}, depth_scale * depth.at(x, y));
-      if (point.cwiseAbs().maxCoeff() < farthest)
-        coordinates.insert(coordinates.end(), point.data(), point.data() + 3);
-      else
-        ++lost;
-    }
-  const std::size_t measured = lost + coordinates.size() / 3;
-  if (100 * lost > measured)
-    throw InputError(source + ": " + format_count(lost) + " of " + format_count(measured) +
-                     " pixels become points more than 100 km away, or none: check the camera's matrix and "
-                     "distortion, and the depth scale");
-  return Eigen::Map<Points>(coordinates.data(), static_cast<Eigen::Index>(coordinates.size() / 3), 3);
-}
-
 }  // namespace flash::data

@@ -40,10 +40,4 @@ void save_depth_image(const DepthImage& image, const std::string& path);
 MaskImage load_mask(const std::string& path);
 void save_mask(const MaskImage& image, const std::string& path);
 
-/// Points in the camera frame [m] of the pixels with depth and, where the mask is not empty, inside it.
-/// depth_scale: metres a count. Pixels that the lens puts nowhere, or more than 100 km away, are left out.
-/// Throws InputError naming `source` where these are more than 1 %, or where sizes differ.
-Points points_from_depth(const DepthImage& depth, const MaskImage& mask, const CameraIntrinsics& camera,
-                         double depth_scale, const std::string& source);
-
 }  // namespace flash::data

@@ -7,6 +7,8 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/pose_numbers.h"
+#include "data/pose_table.h"
 #include "data/text.h"
 
 namespace flash::data {
@@ -14,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "frame2" before "frame10": runs of digits count as numbers.
+}  // namespace
+
 bool natural_less(const std::string& a, const std::string& b) {
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   std::size_t i = 0, j = 0;
@@ -37,8 +40,6 @@ bool natural_less(const std::string& a, const std::string& b) {
   if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
   return a < b;  // they differ in leading zeros
 }
-
-}  // namespace
 
 std::vector<std::string> files_in_order(const std::string& folder,
                                         const std::vector<std::string>& extensions) {
@@ -126,18 +127,20 @@ std::vector<double> load_frame_times(const std::string& path, std::size_t frames
   LineReader lines(text);
   std::string_view line;
   lines.next(line);
-  const std::vector<std::string_view> names = split(line, ",");
-  const auto column = std::find_if(names.begin(), names.end(),
-                                   [](std::string_view name) { return name == "t" || name == "t_s"; });
+  const char* const separator = line.find(';') == std::string_view::npos ? "," : ";";
+  const std::vector<std::string_view> names = split(line, separator);
+  const auto column = std::find_if(names.begin(), names.end(), [](std::string_view name) {
+    return name == "t_s" || column_name(trimmed(name)) == "t";
+  });
   if (column == names.end())
     throw input_error(path, "header", "found \"" + std::string(line) + "\", expected a column t or t_s");
   const std::size_t index = static_cast<std::size_t>(column - names.begin());
   std::vector<double> result;
   while (lines.next(line)) {
     if (line.empty()) continue;
-    const std::vector<std::string_view> cells = split(line, ",");
-    const std::optional<double> time =
-        cells.size() == names.size() ? parse_number(cells[index]) : std::nullopt;
+    const std::vector<std::string_view> cells = split(line, separator);
+    std::optional<double> time = cells.size() == names.size() ? parse_number(cells[index]) : std::nullopt;
+    if (time) time = seconds_of(*time);
     if (!time || !std::isfinite(*time) || (!result.empty() && *time <= result.back()))
       throw input_error(path, "line " + std::to_string(lines.number()),
                         "found \"" + std::string(line) + "\", expected strictly increasing times");

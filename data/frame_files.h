@@ -7,6 +7,9 @@
 
 namespace flash::data {
 
+/// "frame2" before "frame10": runs of digits count as numbers.
+bool natural_less(const std::string& a, const std::string& b);
+
 /// The files of a folder whose names end in one of `extensions`, in order of name: 2 before 10. May be empty.
 /// Throws InputError where there is no such folder, and where such a name is of a folder, a pipe, a device or
 /// a broken link: without it the files after it would be counted wrongly.

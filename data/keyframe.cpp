@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "data/atomic_file.h"
-#include "data/depth_image.h"
+#include "data/depth_map.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/recording.h"
@@ -115,10 +115,9 @@ Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recor
     check_scale(recording, cloud, recorded.cloud);
   } else if (!recorded.depth.empty()) {
     const MaskImage mask = recorded.mask.empty() ? MaskImage{} : load_mask(recorded.mask);
-    cloud =
-        transformed(points_from_depth(load_depth_image(recorded.depth), mask, recording.camera->intrinsics,
-                                      recording.camera->depth_scale, recorded.depth),
-                    recording.camera->base_from_camera);
+    cloud = transformed(points_from_depth(load_depth(recorded.depth, recording.camera->depth_scale), mask,
+                                          recording.camera->intrinsics, recorded.depth),
+                        recording.camera->base_from_camera);
     check_scale(recording, cloud, recorded.depth);
   }
   keyframe.cloud = inside(recording.crop, cloud);

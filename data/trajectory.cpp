@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/pose_file.h"
+#include "data/pose_numbers.h"
+#include "data/pose_table.h"
 #include "data/text.h"
 
 namespace flash::data {
@@ -24,19 +28,42 @@ double parse_value(std::string_view word, const char* column, const std::string&
   return *value;
 }
 
-void append(Trajectory& trajectory, const PoseRow& row, const std::string& path, int line) {
-  if (!trajectory.times.empty() && row[0] <= trajectory.times.back())
-    throw input_error(path, line_name(line),
-                      "time " + format_number(row[0]) + " s follows " +
-                          format_number(trajectory.times.back()) + " s, expected strictly increasing times");
+void append(Trajectory& trajectory, double time, const Eigen::Isometry3d& pose, const std::string& path,
+            const std::string& where) {
+  if (!trajectory.times.empty() && time <= trajectory.times.back())
+    throw input_error(path, where,
+                      "time " + format_number(time) + " s follows " + format_number(trajectory.times.back()) +
+                          " s, expected strictly increasing times");
+  trajectory.times.push_back(time);
+  trajectory.poses.push_back(pose);
+}
+
+Eigen::Isometry3d pose_of(const PoseRow& row, const std::string& path, int line) {
   Eigen::Matrix<double, 7, 1> pose;
   std::copy(row.begin() + 1, row.end(), pose.data());
   const double norm = pose.tail<4>().norm();
   if (std::abs(norm - 1) > 1e-3)
     throw input_error(path, line_name(line),
                       "quaternion has length " + format_short(norm) + ", expected 1 (order qx qy qz qw)");
-  trajectory.times.push_back(row[0]);
-  trajectory.poses.push_back(from_vector(pose));
+  return from_vector(pose);
+}
+
+/// The places of t tx ty tz qx qy qz qw in a line where a comment names them in another order, as w before x,
+/// y and z.
+std::optional<std::array<std::size_t, 8>> named_order(const std::vector<std::string_view>& words) {
+  std::vector<std::string> names;
+  for (const std::string_view word : words)
+    if (const std::string name = column_name(trimmed(word.substr(0, word.find('['))));
+        !name.empty() && word.front() != '[')
+      names.push_back(name);
+  std::array<std::size_t, 8> order{};
+  if (names.size() != order.size()) return std::nullopt;
+  for (std::size_t c = 0; c < order.size(); ++c) {
+    const auto found = std::find(names.begin(), names.end(), kColumns[c]);
+    if (found == names.end()) return std::nullopt;
+    order[c] = static_cast<std::size_t>(found - names.begin());
+  }
+  return order;
 }
 
 void expect_poses(const Trajectory& trajectory, const std::string& path) {
@@ -85,17 +112,24 @@ Eigen::Isometry3d pose_at(const Trajectory& trajectory, double t) {
 Trajectory load_tum(const std::string& path) {
   const std::string text = read_file(path);
   Trajectory trajectory;
+  std::array<std::size_t, 8> order = {0, 1, 2, 3, 4, 5, 6, 7};
   LineReader lines(text);
   for (std::string_view line; lines.next(line);) {
     const std::vector<std::string_view> words = split(line);
-    if (words.empty() || words[0].front() == '#') continue;
+    if (words.empty()) continue;
+    if (words[0].front() == '#') {
+      if (trajectory.times.empty()) order = named_order(words).value_or(order);
+      continue;
+    }
     if (words.size() != 8)
       throw input_error(
           path, line_name(lines.number()),
           "found " + std::to_string(words.size()) + " values, expected 8: t tx ty tz qx qy qz qw");
     PoseRow row;
-    for (std::size_t c = 0; c < 8; ++c) row[c] = parse_value(words[c], kColumns[c], path, lines.number());
-    append(trajectory, row, path, lines.number());
+    for (std::size_t c = 0; c < 8; ++c)
+      row[c] = parse_value(words[order[c]], kColumns[c], path, lines.number());
+    append(trajectory, seconds_of(row[0]), pose_of(row, path, lines.number()), path,
+           line_name(lines.number()));
   }
   expect_poses(trajectory, path);
   return trajectory;
@@ -111,52 +145,24 @@ void save_tum(const Trajectory& trajectory, const std::string& path) {
   write_atomically(path, text);
 }
 
-Trajectory load_trajectory_csv(const std::string& path) {
-  const std::string text = read_file(path);
+namespace {
+
+Trajectory timed(const PoseList& list, const std::string& path) {
+  if (!list.timed)
+    throw InputError(path + ": found " + std::to_string(list.poses.size()) +
+                     " poses without times, expected a time before each, as t tx ty tz qx qy qz qw");
   Trajectory trajectory;
-  LineReader lines(text);
-  std::array<std::size_t, 8> column_of{};
-  std::size_t columns = 0;
-  std::string_view separator;
-  for (std::string_view line; lines.next(line);) {
-    if (line.empty() || line.front() == '#') continue;
-    if (columns == 0) {
-      separator = line.find(';') == std::string_view::npos ? "," : ";";
-      std::vector<std::string_view> names = split(line, separator);
-      columns = names.size();
-      for (std::string_view& name : names) {
-        const std::vector<std::string_view> trimmed = split(name);
-        name = trimmed.empty() ? std::string_view() : trimmed[0];
-      }
-      for (std::size_t c = 0; c < 8; ++c) {
-        const auto found = std::find(names.begin(), names.end(), kColumns[c]);
-        if (found == names.end())
-          throw input_error(
-              path, "header",
-              "column \"" + std::string(kColumns[c]) + "\" is missing, expected t,tx,ty,tz,qx,qy,qz,qw");
-        column_of[c] = static_cast<std::size_t>(found - names.begin());
-      }
-      continue;
-    }
-    const std::vector<std::string_view> cells = split(line, separator);
-    if (cells.size() != columns)
-      throw input_error(
-          path, line_name(lines.number()),
-          "found " + std::to_string(cells.size()) + " columns, expected " + std::to_string(columns));
-    PoseRow row;
-    for (std::size_t c = 0; c < 8; ++c) {
-      const std::vector<std::string_view> trimmed = split(cells[column_of[c]]);
-      row[c] =
-          parse_value(trimmed.empty() ? std::string_view() : trimmed[0], kColumns[c], path, lines.number());
-    }
-    append(trajectory, row, path, lines.number());
-  }
-  expect_poses(trajectory, path);
+  for (std::size_t i = 0; i < list.poses.size(); ++i)
+    append(trajectory, list.poses[i].stamp, list.poses[i].pose, path, "pose " + std::to_string(i + 1));
   return trajectory;
 }
 
+}  // namespace
+
+Trajectory load_trajectory_csv(const std::string& path) { return timed(load_pose_table(path), path); }
+
 Trajectory load_trajectory(const std::string& path) {
-  return lower_extension(path) == ".csv" ? load_trajectory_csv(path) : load_tum(path);
+  return is_tum(path) ? load_tum(path) : timed(load_pose_list(path), path);
 }
 
 }  // namespace flash::data

@@ -17,16 +17,18 @@ Eigen::Isometry3d pose_between(const Eigen::Isometry3d& before, const Eigen::Iso
 /// Pose at time t [s]: linear in translation, slerp in rotation, held constant outside the recorded span.
 Eigen::Isometry3d pose_at(const Trajectory& trajectory, double t);
 
-/// TUM lines `t tx ty tz qx qy qz qw`, `#` comments. Throws InputError naming the line unless times increase
-/// strictly and quaternions are unit to 1e-3.
+/// TUM lines `t tx ty tz qx qy qz qw`, `#` comments; t in seconds or nanoseconds. A comment before the first
+/// line that names the columns in another order, as qw qx qy qz, is followed. Throws InputError naming the
+/// line unless times increase strictly and quaternions are unit to 1e-3.
 Trajectory load_tum(const std::string& path);
 void save_tum(const Trajectory& trajectory, const std::string& path);
 
-/// CSV whose header names t,tx,ty,tz,qx,qy,qz,qw in any order, among other columns; separator comma or
-/// semicolon. Errors as load_tum.
+/// CSV whose header names t,tx,ty,tz,qx,qy,qz,qw in any order, or as load_pose_table knows them; separator
+/// comma or semicolon. Errors as load_tum.
 Trajectory load_trajectory_csv(const std::string& path);
 
-/// .csv as CSV, anything else as TUM.
+/// Any list of poses that load_pose_list reads and whose poses have times: TUM, CSV, JSON, or bare matrices
+/// and quaternions behind a time. Throws InputError where they have none, and as load_tum.
 Trajectory load_trajectory(const std::string& path);
 
 /// Pose as translation and x y z w quaternion, the order of files.

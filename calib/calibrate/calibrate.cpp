@@ -66,6 +66,12 @@ void expect_convention(Setup setup, const std::vector<Observation>& observations
       check_size(setup, observations, symmetries, stated, settings.convention);
   if (sized && (hopeless || !measurable_size(sized->size))) throw data::InputError(sized->sentence);
   if (!hopeless) return;
+  if (!stated.found)
+    throw data::InputError(
+        "robot and camera do not tell of the same motion: no three of " +
+        std::to_string(observations.size()) +
+        " views turn by the same angles, and no other convention explains them; check that each picture, or "
+        "pose of the target, stands beside the robot's pose of its moment");
   constexpr double kTurnsAgree = 1 * kDegree;
   char text[320];
   std::snprintf(
@@ -248,10 +254,9 @@ void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_
   const Vector6d away = motion_between(result.poses.X, refined.bundle.cameras.front());
   const bool depends = away.dot(result.covariance.ldlt().solve(away)) > kChiSquare999;
   char text[200];
-  std::snprintf(
-      text, sizeof text,
-      "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --stated-intrinsics out",
-      1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
+  std::snprintf(text, sizeof text,
+                "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --lens stated out",
+                1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
   tell_first(result, lens_differs(lens) + text, depends);
 }
 
@@ -320,8 +325,8 @@ void warn(Calibration& result) {
     constexpr std::ptrdiff_t kBlunders = 10;  // one view in so many is a slip now and then
     if (misfits > 1 && misfits * kBlunders > std::ssize(result.views))
       sentence +=
-          ", too many for slips: an arm whose model is wrong loses good views, and then the stated "
-          "deviations are too small";
+          ", too many for slips: pictures of other poses, or good views lost by an arm whose model is wrong; "
+          "then the stated deviations are too small";
     result.warnings.push_back(std::move(sentence));
   }
   if (result.selection.renumbered > 0)
@@ -425,6 +430,9 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
     result.repeatable = pixels->repeatable;
   }
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
+  result.lens.stated = to_vector(camera);
+  result.lens.camera_shift =
+      camera_shift(bundle, result.unknowns, result.refined.covariance, result.lens.stated);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
   result.edges = edge_estimate(bundle, result.unknowns, result.shared_covariance);
   if (settings.lens != given.lens)

@@ -48,12 +48,6 @@ std::vector<double> numbers(const data::JsonObject& object, const char* field) {
   return values;
 }
 
-Eigen::Vector2d two_numbers(const data::JsonObject& object, const char* field) {
-  const std::vector<double> values = numbers(object, field);
-  if (values.size() != 2) throw object.error(field, "two numbers");
-  return {values[0], values[1]};
-}
-
 /// Files of old have no twist.
 Warp read_warp(const data::JsonObject& scale) {
   const std::vector<double> values = numbers(scale, "warp_mm");
@@ -61,21 +55,6 @@ Warp read_warp(const data::JsonObject& scale) {
   Warp warp = Warp::Zero();
   for (std::size_t i = 0; i < values.size(); ++i) warp[static_cast<Eigen::Index>(i)] = 1e-3 * values[i];
   return warp;
-}
-
-data::CameraIntrinsics read_lens(const data::JsonObject& lens) {
-  data::CameraIntrinsics camera;
-  const Eigen::Vector2i size = two_numbers(lens, "size_px").cast<int>();
-  camera.width = size.x();
-  camera.height = size.y();
-  IntrinsicsVector values = IntrinsicsVector::Zero();
-  values.head<2>() = two_numbers(lens, "focal_px");
-  if (!(values.head<2>().array() > 0).all()) throw lens.error("focal_px", "two numbers above 0");
-  values.segment<2>(2) = two_numbers(lens, "centre_px");
-  const std::vector<double> distortion = numbers(lens, "distortion");
-  for (std::size_t i = 0; i < std::min<std::size_t>(8, distortion.size()); ++i)
-    values[4 + static_cast<Eigen::Index>(i)] = distortion[i];
-  return with_vector(camera, values);
 }
 
 }  // namespace
@@ -96,6 +75,7 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
     extrinsics.target = shape_of(calibration.refined.bundle, 0);
     extrinsics.edge_offset = edge_offset(calibration.refined.bundle, 0);
     extrinsics.lens = calibration.refined.bundle.intrinsics.front();
+    extrinsics.stated_lens = with_vector(*extrinsics.lens, calibration.lens.stated);
   }
   extrinsics.inputs = inputs;
   return extrinsics;
@@ -109,6 +89,8 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   extrinsics.setup = parse_setup(object.string("setup"), path, "setup");
   extrinsics.method = object.string("method");
   extrinsics.transform = pose.transform;
+  extrinsics.lens = pose.lens;
+  extrinsics.stated_lens = pose.stated;
   extrinsics.warnings = pose.warnings;
   extrinsics.usable = pose.usable;
   extrinsics.target_pose = data::read_transform(object.object("target_pose"));
@@ -145,6 +127,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   if (object.has("scale")) {
     const data::JsonObject scale = object.object("scale");
     if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");
+    extrinsics.size_unknown = scale.boolean("solved", false) && !scale.has("prior_sd");
     if (scale.has("warp_mm")) extrinsics.target.warp = read_warp(scale);
   }
   if (object.has("edges")) extrinsics.edge_offset = object.object("edges").number("offset_px");
@@ -153,10 +136,6 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
     const std::optional<Use> known = use_named(use);
     if (!known) throw object.error("use", "workspace, image or two-arms, found " + use);
     extrinsics.use = *known;
-  }
-  if (object.has("lens")) {
-    const data::JsonObject lens = object.object("lens");
-    if (lens.has("size_px")) extrinsics.lens = read_lens(lens);
   }
   if (object.has("provenance")) {
     const data::JsonObject from = object.object("provenance");

@@ -40,8 +40,10 @@ struct Extrinsics {
   NamedTransform target_pose;                  ///< base <- target (eye-in-hand) or gripper <- target
   Matrix6d covariance = Matrix6d::Zero();      ///< of the transform, right perturbation (dt, dtheta) [m, rad]
   TargetShape target;                          ///< that transform and target_pose are for
+  bool size_unknown = false;                   ///< nothing was known of the target's size beforehand
   double edge_offset = 0;                      ///< of the camera's pictures [px], see EdgeOffset
   std::optional<data::CameraIntrinsics> lens;  ///< likewise; none of pose pairs
+  std::optional<data::CameraIntrinsics> stated_lens;  ///< that the calibration began with, where it is known
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
   std::optional<ClosingError>
       held_out;        ///< rms of the target's pose in views left out; none in files without

@@ -115,16 +115,16 @@ data::Picture draw_profile(const Plane& plane, const std::vector<Resting>& views
 
 }  // namespace
 
-TargetCloud target_cloud(const data::DepthImage& depth, double depth_scale, const GreyImage& image,
+TargetCloud target_cloud(const data::DepthMap& depth, const GreyImage& image,
                          const data::CameraIntrinsics& camera, const Observation& view) {
   expect_registered(depth, camera, view.image);
   TargetCloud cloud;
   cloud.image = view.image;
   std::vector<Eigen::Vector3d> points;
   for (const Eigen::Vector2i& pixel : pixels_within(view.pixels, depth.width, depth.height)) {
-    const int count = depth.at(pixel.x(), pixel.y());
-    if (count == 0) continue;
-    points.push_back(data::unproject(camera, pixel.cast<double>(), depth_scale * count));
+    const double z = depth.at(pixel.x(), pixel.y());
+    if (!(z > 0)) continue;
+    points.push_back(data::unproject(camera, pixel.cast<double>(), z));
     cloud.colour.push_back(image.at(pixel.x(), pixel.y()));
   }
   if (static_cast<int>(points.size()) < kLeastPoints) {

@@ -8,7 +8,7 @@
 #include "calib/dataset/target.h"
 #include "calib/detect/grey_image.h"
 #include "data/camera.h"
-#include "data/depth_image.h"
+#include "data/depth_map.h"
 #include "data/picture.h"
 
 namespace flash::calib {
@@ -22,9 +22,9 @@ struct TargetCloud {
   std::vector<int> corner_ids;
 };
 
-/// Points within the outline of the corners seen. depth_scale: metres a count. Empty where fewer than 50
+/// Points within the outline of the corners seen. Empty where fewer than 50
 /// pixels have depth. Throws data::InputError naming the view where sizes differ.
-TargetCloud target_cloud(const data::DepthImage& depth, double depth_scale, const GreyImage& image,
+TargetCloud target_cloud(const data::DepthMap& depth, const GreyImage& image,
                          const data::CameraIntrinsics& camera, const Observation& view);
 
 struct CloudView {

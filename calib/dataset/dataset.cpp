@@ -5,11 +5,17 @@
 #include <filesystem>
 #include <map>
 
-#include "calib/dataset/bare_poses.h"
-#include "calib/dataset/intrinsics_file.h"
+#include "calib/dataset/joint_list.h"
 #include "calib/dataset/urdf_file.h"
+#include "data/bare_poses.h"
+#include "data/depth_map.h"
 #include "data/error.h"
+#include "data/frame_files.h"
+#include "data/intrinsics_file.h"
 #include "data/json_reader.h"
+#include "data/pose_file.h"
+#include "data/pose_numbers.h"
+#include "data/rotation_angles.h"
 #include "data/text.h"
 
 namespace flash::calib {
@@ -74,7 +80,7 @@ std::vector<fs::path> pose_files(const fs::path& folder, const std::string& begi
   for (const std::vector<std::string>& endings :
        {std::vector<std::string>{".yaml", ".yml"}, std::vector<std::string>{".txt"}}) {
     std::vector<fs::path> files = files_in(folder, endings, beginning);
-    std::erase_if(files, [](const fs::path& file) { return !number_in_name(file.string()); });
+    std::erase_if(files, [](const fs::path& file) { return !data::number_in_name(file.string()); });
     if (!files.empty()) return files;
   }
   return {};
@@ -100,18 +106,18 @@ std::vector<fs::path> files_of_poses(const fs::path& source) {
   return files.empty() ? pose_files(source) : files;
 }
 
-PoseList load_poses(const fs::path& source) {
-  if (!fs::is_directory(source)) return load_pose_list(source.string());
+data::PoseList load_poses(const fs::path& source) {
+  if (!fs::is_directory(source)) return data::load_pose_list(source.string());
   const std::vector<fs::path> files = files_of_poses(source);
   if (files.empty())
     throw InputError(source.string() + ": found no poses, expected a YAML or text file for each");
   if (data::lower_extension(files.front().string()) == ".txt") {
     std::vector<std::string> names;
     for (const fs::path& file : files) names.push_back(file.string());
-    return load_bare_pose_files(names, source.string());
+    return data::load_bare_pose_files(names, source.string());
   }
-  PoseList list;
-  for (const fs::path& file : files) list.poses.push_back(load_pose_yaml(file.string()));
+  data::PoseList list;
+  for (const fs::path& file : files) list.poses.push_back(data::load_pose_yaml(file.string()));
   return list;
 }
 
@@ -132,17 +138,17 @@ std::string find_camera(const fs::path& folder) {
 std::optional<double> time_in_name(const fs::path& path) {
   std::optional<double> time = data::parse_number(path.stem().string());
   if (!time || !std::isfinite(*time)) return std::nullopt;
-  return std::abs(*time) > 1e14 ? *time * 1e-9 : *time;
+  return data::seconds_of(*time);
 }
 
 /// Pairs pictures with poses, by the poses' own word.
 class PosePairing {
  public:
-  PosePairing(PoseList list, std::string source)
+  PosePairing(data::PoseList list, std::string source)
       : poses_(std::move(list.poses)), source_(std::move(source)), in_order_(list.in_order) {
     bool whole = true;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
-      const RecordedPose& pose = poses_[i];
+      const data::RecordedPose& pose = poses_[i];
       named_ = named_ || !pose.image.empty();
       whole = whole && pose.stamp == std::floor(pose.stamp) && std::abs(pose.stamp) < 1e8;
       const bool fresh = pose.image.empty()
@@ -160,7 +166,7 @@ class PosePairing {
   /// place: of the picture among all, in order. Throws InputError where it has no pose.
   /// robot: whose joints the poses came as, or null.
   void pair(Frame& frame, const fs::path& image, std::size_t place, const SerialChain* robot) const {
-    const RecordedPose* found = nullptr;
+    const data::RecordedPose* found = nullptr;
     if (in_order_) {
       found = &poses_.at(place);
     } else if (named_) {
@@ -172,7 +178,7 @@ class PosePairing {
       pair_by_time(frame, image);
       return;
     } else {
-      const std::optional<long> number = number_in_name(image.string());
+      const std::optional<long> number = data::number_in_name(image.string());
       if (!number)
         throw InputError(image.string() + ": found no number in the file name, expected that of its pose");
       const auto entry = by_stamp_.find(static_cast<double>(*number));
@@ -223,7 +229,7 @@ class PosePairing {
                       *time);
   }
 
-  std::vector<RecordedPose> poses_;
+  std::vector<data::RecordedPose> poses_;
   std::string source_;
   std::map<double, std::size_t> by_stamp_;
   std::map<std::string, std::size_t> by_name_;
@@ -232,14 +238,14 @@ class PosePairing {
 
 /// The rotations anew, as `order` reads the angles of the poses.
 void read_angles(const std::string& order, Dataset& dataset) {
-  const std::vector<std::string>& orders = angle_orders();
+  const std::vector<std::string>& orders = data::angle_orders();
   if (std::find(orders.begin(), orders.end(), order) == orders.end())
     throw InputError("angles: found \"" + order +
                      "\", expected an order as xyz (fixed axes), XYZ (turning axes) or rotvec");
   for (Frame& frame : dataset.frames) {
     if (!frame.angles)
       throw InputError(dataset.poses_path + ": found no angles, expected three a pose to read as " + order);
-    frame.T_base_gripper.linear() = rotation_from_angles(*frame.angles, order);
+    frame.T_base_gripper.linear() = data::rotation_from_angles(*frame.angles, order);
   }
 }
 
@@ -263,7 +269,7 @@ void read_target(const fs::path& folder, Dataset& dataset) {
 void read_pairs(const fs::path& file, Dataset& dataset) {
   dataset.poses_path = file.string();
   dataset.files.push_back(dataset.poses_path);
-  for (const PosePair& pair : load_pose_pairs(file.string())) {
+  for (const data::PosePair& pair : data::load_pose_pairs(file.string())) {
     Frame frame;
     frame.stamp = static_cast<double>(dataset.frames.size());
     frame.name = "sample " + std::to_string(dataset.frames.size());
@@ -293,11 +299,14 @@ std::string choose_poses(const fs::path& folder, const DatasetOptions& options) 
   return sources.front().string();
 }
 
-/// By the last number in their names where all have one of their own, else as they are.
+/// By the last number in their names where all have one of their own, else by name, 2 before 10.
 void order_by_number(std::vector<fs::path>& images) {
+  std::sort(images.begin(), images.end(),
+            [](const fs::path& a, const fs::path& b) { return data::natural_less(a.string(), b.string()); });
   std::map<long, fs::path> numbered;
   for (const fs::path& image : images)
-    if (const std::optional<long> number = number_in_name(image.string())) numbered.emplace(*number, image);
+    if (const std::optional<long> number = data::number_in_name(image.string()))
+      numbered.emplace(*number, image);
   if (numbered.size() != images.size()) return;
   std::transform(numbered.begin(), numbered.end(), images.begin(),
                  [](const auto& entry) { return entry.second; });
@@ -310,7 +319,7 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
   dataset.camera_path = options.camera.empty() ? find_camera(folder) : options.camera;
   if (!dataset.camera_path.empty()) {
     dataset.files.push_back(dataset.camera_path);
-    dataset.camera = load_intrinsics(dataset.camera_path);
+    dataset.camera = data::load_intrinsics(dataset.camera_path);
     dataset.lens_covariance = load_lens_covariance(dataset.camera_path);
   }
   if (!dataset.camera && options.needs_camera)
@@ -329,7 +338,8 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
       dataset.files.push_back(options.robot);
     }
     for (const fs::path& file : files_of_poses(dataset.poses_path)) dataset.files.push_back(file.string());
-    PoseList list = robot ? load_joint_list(dataset.poses_path, *robot) : load_poses(dataset.poses_path);
+    data::PoseList list =
+        robot ? load_joint_list(dataset.poses_path, *robot) : load_poses(dataset.poses_path);
     poses = list.poses.size();
     if (list.in_order && poses != images.size())
       throw InputError(dataset.poses_path + ": found " + std::to_string(poses) +
@@ -346,10 +356,13 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
     frame.name = image.filename().string();
     frame.image = image.string();
     dataset.files.push_back(frame.image);
-    frame.stamp =
-        static_cast<double>(number_in_name(frame.image).value_or(static_cast<long>(dataset.frames.size())));
-    const fs::path depth = folder / "depth" / (image.stem().string() + ".png");
-    if (options.depth && fs::exists(depth)) dataset.files.push_back(frame.depth = depth.string());
+    frame.stamp = static_cast<double>(
+        data::number_in_name(frame.image).value_or(static_cast<long>(dataset.frames.size())));
+    for (const std::string& ending : data::depth_endings()) {
+      const fs::path depth = folder / "depth" / (image.stem().string() + ending);
+      if (options.depth && frame.depth.empty() && fs::exists(depth))
+        dataset.files.push_back(frame.depth = depth.string());
+    }
     try {
       if (pairing) pairing->pair(frame, image, place, robot ? &*robot : nullptr);
       dataset.frames.push_back(std::move(frame));

@@ -5,7 +5,6 @@
 
 #include "calib/dataset/lens_file.h"
 #include "calib/dataset/observation.h"
-#include "calib/dataset/pose_file.h"
 #include "data/camera.h"
 #include "data/trajectory.h"
 
@@ -15,7 +14,7 @@ namespace flash::calib {
 struct Frame {
   std::string name;   ///< file name of the picture, for messages; "sample 3" of a set of pairs
   std::string image;  ///< path; empty in a set of pairs
-  std::string depth;  ///< path of the 16-bit depth picture; empty where there is none
+  std::string depth;  ///< path of the picture of depth; empty where there is none
   double stamp = 0;   ///< number of the picture, or its time [s]
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
   std::optional<Eigen::Vector3d> angles;  ///< the rotation as written, where it came as angles [rad]
@@ -53,11 +52,12 @@ struct DatasetOptions {
 
 /// A folder with images/ (or rgb/, color/, img/, or the pictures themselves; jpg, png or bmp, sorted), poses
 /// as a list (poses.tum, .csv, .txt, .json) or one a file (poses/*.yaml or *.txt, pose*.yaml or *.txt),
-/// intrinsics (load_intrinsics), target.json, and depth/ with 16-bit png of the same names. Or a set of
-/// pairs: a .samples or pose_samples.json file, or a folder with one; beside pictures its robot poses count.
-/// Pictures pair with poses by file name, by the last number in it, by their order where poses have neither,
-/// or by time: where stamps are times, the pose is interpolated within `stream`. A picture without a pose is
-/// left out. Throws InputError: nothing found, two sources of poses, no picture with a pose.
+/// intrinsics (load_intrinsics), target.json, and depth/ with pictures of depth of the same names
+/// (data::load_depth). Or a set of pairs: a .samples or pose_samples.json file, or a folder with one; beside
+/// pictures its robot poses count. Pictures pair with poses by file name, by the last number in it, by their
+/// order where poses have neither, or by time: where stamps are times, the pose is interpolated within
+/// `stream`. A picture without a pose is left out. Throws InputError: nothing found, two sources of poses, no
+/// picture with a pose.
 Dataset load_dataset(const std::string& path, const DatasetOptions& options = {});
 
 /// Observations of a set of pairs: poses, no points.

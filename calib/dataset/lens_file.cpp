@@ -3,10 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "calib/dataset/yaml_file.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "data/yaml_file.h"
 
 namespace flash::calib {
 
@@ -30,11 +30,11 @@ void save_lens(const data::CameraIntrinsics& camera, const LensCovariance& covar
 
 std::optional<LensCovariance> load_lens_covariance(const std::string& path) {
   if (data::lower_extension(path) == ".npz") return std::nullopt;
-  const YAML::Node file = load_yaml(path);
+  const YAML::Node file = data::load_yaml(path);
   if (!file.IsMap() || !file[kField]) return std::nullopt;
   const YAML::Node node = file[kField];
   const std::vector<double> values =
-      node.IsMap() && node["data"] ? yaml_numbers(node["data"], path, kField) : std::vector<double>();
+      node.IsMap() && node["data"] ? data::yaml_numbers(node["data"], path, kField) : std::vector<double>();
   const auto size = static_cast<Eigen::Index>(std::lround(std::sqrt(static_cast<double>(values.size()))));
   if (size < 4 || size > kIntrinsics || size * size != static_cast<Eigen::Index>(values.size()))
     throw data::input_error(path, kField, "expected {rows, cols, data: [...]}, square, 4 to 12 rows");

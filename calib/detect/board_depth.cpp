@@ -110,7 +110,7 @@ std::vector<Eigen::Vector2i> pixels_within(const Eigen::Matrix2Xd& corners, int 
   return pixels;
 }
 
-void expect_registered(const data::DepthImage& depth, const data::CameraIntrinsics& camera,
+void expect_registered(const data::DepthMap& depth, const data::CameraIntrinsics& camera,
                        const std::string& image) {
   const auto size = [](int width, int height) {
     return std::to_string(width) + " x " + std::to_string(height);
@@ -121,8 +121,8 @@ void expect_registered(const data::DepthImage& depth, const data::CameraIntrinsi
                            " (depth must be registered to it)");
 }
 
-BoardDepth board_depth(const data::DepthImage& depth, double depth_scale,
-                       const data::CameraIntrinsics& camera, const Observation& view) {
+BoardDepth board_depth(const data::DepthMap& depth, const data::CameraIntrinsics& camera,
+                       const Observation& view) {
   expect_registered(depth, camera, view.image);
   BoardDepth result;
   std::vector<Eigen::Vector2i> pixels = pixels_within(view.pixels, depth.width, depth.height);
@@ -132,8 +132,7 @@ BoardDepth board_depth(const data::DepthImage& depth, double depth_scale,
   const double step = std::max(1.0, static_cast<double>(pixels.size()) / kMostPixels);
   for (double i = 0; i < static_cast<double>(pixels.size()); i += step) {
     const Eigen::Vector2i& pixel = pixels[static_cast<std::size_t>(i)];
-    depths.push_back(
-        {data::unproject(camera, pixel.cast<double>(), 1), depth_scale * depth.at(pixel.x(), pixel.y())});
+    depths.push_back({data::unproject(camera, pixel.cast<double>(), 1), depth.at(pixel.x(), pixel.y())});
   }
 
   Eigen::Vector3d plane = seed(depths);

@@ -5,7 +5,7 @@
 
 #include "calib/dataset/observation.h"
 #include "data/camera.h"
-#include "data/depth_image.h"
+#include "data/depth_map.h"
 
 namespace flash::calib {
 
@@ -23,13 +23,13 @@ struct BoardDepth {
 };
 
 /// Least squares of the depths, z = 1 / (a + b x + c y) on normalised rays (x, y, 1), pixels beyond four
-/// robust standard deviations left out; at most about 5,000 pixels, evenly spread. depth_scale: metres a
-/// count. Throws data::InputError naming the view where the sizes of depth and camera differ.
-BoardDepth board_depth(const data::DepthImage& depth, double depth_scale,
-                       const data::CameraIntrinsics& camera, const Observation& view);
+/// robust standard deviations left out; at most about 5,000 pixels, evenly spread. Throws data::InputError
+/// naming the view where the sizes of depth and camera differ.
+BoardDepth board_depth(const data::DepthMap& depth, const data::CameraIntrinsics& camera,
+                       const Observation& view);
 
 /// Throws data::InputError naming the view unless the depth picture is as large as the camera's.
-void expect_registered(const data::DepthImage& depth, const data::CameraIntrinsics& camera,
+void expect_registered(const data::DepthMap& depth, const data::CameraIntrinsics& camera,
                        const std::string& image);
 
 /// Measured distance over that of the pose which the corners give, mean over the three places.

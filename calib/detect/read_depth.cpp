@@ -41,14 +41,14 @@ std::optional<DepthViews> read_depth(const Dataset& dataset, const std::vector<D
     const Frame& frame = dataset.frames[i];
     if (frame.depth.empty() || detections[i].readings.empty()) continue;
     const Observation& view = detections[i].readings.front().observation;
-    data::DepthImage picture;
+    data::DepthMap picture;
     try {
-      picture = data::load_depth_image(frame.depth);
+      picture = data::load_depth(frame.depth, dataset.depth_scale);
     } catch (const data::InputError& error) {
       use.unreadable.emplace_back(error.what());
       continue;
     }
-    const BoardDepth depth = board_depth(picture, dataset.depth_scale, *dataset.camera, view);
+    const BoardDepth depth = board_depth(picture, *dataset.camera, view);
     if (depth.points.cols() == 0) continue;
     views.points[i] = depth.points;
     ratios.push_back(depth_over_pose(depth.points, view.T_camera_target.front()));

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 
 #include "calib/geometry/setup.h"
@@ -6,11 +7,15 @@
 
 namespace flash::calib {
 
+/// Exports for other programs. Each carries the lens that the transform holds with, where there is one, in a
+/// comment that data::find_lens_remark reads.
+using Lens = std::optional<data::CameraIntrinsics>;
+
 /// `ros2 run tf2_ros static_transform_publisher --x ... --frame-id parent --child-frame-id child`
-std::string ros_static_transform(const data::NamedTransform& transform);
+std::string ros_static_transform(const data::NamedTransform& transform, const Lens& lens = {});
 /// A fixed joint, roll, pitch and yaw about fixed x, y, z.
-std::string urdf_joint(const data::NamedTransform& transform);
+std::string urdf_joint(const data::NamedTransform& transform, const Lens& lens = {});
 /// easy_handeye2's calibration file.
-std::string easy_handeye2(const data::NamedTransform& transform, Setup setup);
+std::string easy_handeye2(const data::NamedTransform& transform, Setup setup, const Lens& lens = {});
 
 }  // namespace flash::calib

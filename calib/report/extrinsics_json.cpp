@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/uncertainty/joint_zeros.h"
+#include "data/posed_lens.h"
 #include "data/trajectory.h"
 
 namespace flash::calib {
@@ -99,6 +100,11 @@ Json views_json(const Calibration& calibration) {
   return views;
 }
 
+Json lens_json(const data::CameraIntrinsics& lens) {
+  return {
+      {"focal_px", {lens.fx, lens.fy}}, {"centre_px", {lens.cx, lens.cy}}, {"distortion", lens.distortion}};
+}
+
 Json depth_json(const DepthUse& depth) {
   return {{"used", depth.used},
           {"reason", depth.used ? Json(nullptr) : Json(depth.reason)},
@@ -161,14 +167,17 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                        {"heldout_deg", calibration.held_out.deg}};
   json["lens"] = nullptr;
   if (extrinsics.pixels) {
-    const data::CameraIntrinsics& lens = calibration.refined.bundle.intrinsics.front();
+    const data::CameraIntrinsics &lens = *extrinsics.lens, &stated = *extrinsics.stated_lens;
     json["lens"] = {{"solved", calibration.unknowns.intrinsics > 0},
-                    {"as_stated", calibration.lens.far_off.empty()},
-                    {"size_px", {lens.width, lens.height}},
-                    {"focal_px", {lens.fx, lens.fy}},
-                    {"centre_px", {lens.cx, lens.cy}},
-                    {"distortion", lens.distortion},
-                    {"sd", list(Eigen::VectorXd(calibration.lens.sd.head(kLensUnknowns)))}};
+                    {"as_stated", data::same_lens(lens, stated)},
+                    {"stated_excluded", !calibration.lens.far_off.empty()},
+                    {"size_px", {lens.width, lens.height}}};
+    json["lens"].update(lens_json(lens));
+    json["lens"]["sd"] = list(Eigen::VectorXd(calibration.lens.sd.head(kLensUnknowns)));
+    json["lens"]["stated"] = lens_json(stated);
+    const Vector6d& shift = calibration.lens.camera_shift;
+    json["lens"]["camera_shift_mm"] = list(Eigen::Vector3d(1e3 * shift.head<3>()));
+    json["lens"]["camera_shift_deg"] = list(Eigen::Vector3d(kDegrees * shift.tail<3>()));
   }
   json["depth"] = inputs.depth ? depth_json(*inputs.depth) : Json(nullptr);
   json["time_offset"] = inputs.time_offset ? Json{{"estimate_s", inputs.time_offset->estimate},

@@ -217,8 +217,8 @@ std::string render_report(const Calibration& calibration, const Extrinsics& extr
                     {"fy", camera.fy},       {"cx", camera.cx},         {"cy", camera.cy}};
   page["X"] = pose(calibration.poses.X);
   page["Z"] = pose(calibration.poses.Z);
-  page["ros"] = ros_static_transform(extrinsics.transform);
-  page["urdf"] = urdf_joint(extrinsics.transform);
+  page["ros"] = ros_static_transform(extrinsics.transform, extrinsics.lens);
+  page["urdf"] = urdf_joint(extrinsics.transform, extrinsics.lens);
   const std::string text = data::inside_script(page.dump(-1, ' ', false, Json::error_handler_t::replace));
   return data::fill_page(embedded::calibration_report_template(), {{"@DATA@", text}});
 }

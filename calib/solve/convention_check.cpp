@@ -6,9 +6,9 @@
 #include <cstdio>
 #include <limits>
 
-#include "calib/dataset/pose_file.h"
 #include "calib/geometry/pose.h"
 #include "data/median.h"
+#include "data/rotation_angles.h"
 
 namespace flash::calib {
 namespace {
@@ -67,13 +67,13 @@ void add_pairings(const Reading& as_stated, std::vector<Reading>& readings) {
 Poses with_angles(Poses poses, const std::vector<Eigen::Vector3d>& angles, const std::string& order,
                   double factor) {
   for (std::size_t i = 0; i < poses.size(); ++i)
-    poses[i].linear() = rotation_from_angles(factor * angles[i], order);
+    poses[i].linear() = data::rotation_from_angles(factor * angles[i], order);
   return poses;
 }
 
 std::string sentence_of(const std::string& order) {
   const std::string option = " (--angles " + order + ")";
-  if (order == kRotationVector)
+  if (order == data::kRotationVector)
     return "the three angles are a rotation vector, not roll, pitch, yaw" + option;
   if (order.front() >= 'x') return "the three angles turn about fixed " + order + ", not fixed xyz" + option;
   const std::string whose = order == "ZYX"   ? ", as KUKA's A B C"
@@ -99,7 +99,7 @@ void add_angle_readings(const Reading& as_stated, const std::vector<Eigen::Vecto
   for (const Unit& unit : units) {
     if (unit.factor > 1 && unit.factor * largest > kTurn) continue;
     const std::string prefix = unit.text[0] == 0 ? "" : std::string(unit.text) + ", and ";
-    for (const std::string& order : angle_orders()) {
+    for (const std::string& order : data::angle_orders()) {
       if (unit.factor == 1 && order == "xyz") continue;
       Reading reading = as_stated;
       reading.T_base_gripper = with_angles(as_stated.T_base_gripper, angles, order, unit.factor);

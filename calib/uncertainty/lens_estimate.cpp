@@ -44,14 +44,36 @@ LensEstimate lens_estimate(const Bundle& bundle, const Unknowns& unknowns, const
   return lens;
 }
 
-std::string lens_differs(const LensEstimate& lens) {
+const char* lens_unknown(int i) {
   constexpr const char* kNames[kLensUnknowns] = {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
+  return kNames[i];
+}
+
+Vector6d camera_shift(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
+                      const IntrinsicsVector& stated) {
+  const SharedColumns columns = shared_columns(bundle, unknowns);
+  const int lens = columns.intrinsics.front(), count = columns.intrinsics_count,
+            camera = columns.cameras.front();
+  if (lens < 0) return Vector6d::Zero();
+  const Eigen::VectorXd off = (stated - to_vector(bundle.intrinsics.front())).head(count);
+  return covariance.block(camera, lens, 6, count) *
+         covariance.block(lens, lens, count, count).ldlt().solve(off);
+}
+
+bool exceeds_deviations(const Eigen::Isometry3d& X, const Vector6d& motion, const Matrix6d& covariance) {
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = X.linear();
+  const Vector6d variance = (turn * covariance * turn.transpose()).diagonal().cwiseMax(0);
+  return ((turn * motion).cwiseAbs2() - variance).maxCoeff() > 0;
+}
+
+std::string lens_differs(const LensEstimate& lens) {
   std::string text = "the lens is not as stated:";
   for (const int i : lens.far_off) {
     char part[100];
     std::snprintf(part, sizeof part,
-                  i < 4 ? " %s %.1f +- %.1f, stated %.1f;" : " %s %.3f +- %.3f, stated %.3f;", kNames[i],
-                  lens.estimate[i], 2 * lens.sd[i], lens.stated[i]);
+                  i < 4 ? " %s %.1f +- %.1f, stated %.1f;" : " %s %.3f +- %.3f, stated %.3f;",
+                  lens_unknown(i), lens.estimate[i], 2 * lens.sd[i], lens.stated[i]);
     text += part;
   }
   text.pop_back();

@@ -1,9 +1,7 @@
 #include "data/meshing/fused_frames.h"
 
-#include <filesystem>
-
 #include "data/camera.h"
-#include "data/depth_image.h"
+#include "data/depth_map.h"
 #include "data/error.h"
 #include "data/extrinsics.h"
 #include "data/frame_files.h"
@@ -30,26 +28,30 @@ Points points_of(const std::vector<double>& coordinates) {
 
 }  // namespace
 
-Points fused_depth(const DepthFrames& frames, bool accept_unusable) {
-  const std::vector<std::string> files = files_in_order(frames.folder, {".png"});
-  if (files.empty()) throw InputError(frames.folder + ": found no .png");
-  const CameraIntrinsics camera = load_camera_intrinsics(frames.intrinsics);
+Points fused_depth(const DepthFrames& frames, bool accept_unusable, std::string& notice) {
+  const std::vector<std::string> files = files_in_order(frames.folder, depth_endings());
+  if (files.empty()) throw InputError(frames.folder + ": found no depth images (.png, .npy, .tiff)");
+  std::optional<LensOfFile> own;
+  if (!frames.intrinsics.empty())
+    own = {load_depth_lens(frames.intrinsics, files.front()), frames.intrinsics};
+  CameraPose still;
   std::vector<Eigen::Isometry3d> poses;
-  if (frames.poses.empty())
-    poses.assign(files.size(), load_camera_pose(frames.extrinsics, accept_unusable).transform.T);
-  else
+  if (frames.poses.empty()) {
+    still = load_camera_pose(frames.extrinsics, accept_unusable);
+    poses.assign(files.size(), still.transform.T);
+  } else {
     poses = load_trajectory(frames.poses).poses;
+  }
+  const auto [camera, said] = posed_lens(still, frames.extrinsics, own, frames.lens);
+  notice = said;
   if (poses.size() != files.size())
     throw InputError(frames.poses + ": found " + format_count(poses.size()) + " poses, expected " +
                      format_count(files.size()) + ", one a frame of " + frames.folder);
   std::vector<double> coordinates;
   for (std::size_t i = 0; i < files.size(); ++i) {
     MaskImage mask;
-    if (!frames.masks.empty())
-      mask = load_mask(
-          (std::filesystem::path(frames.masks) / std::filesystem::path(files[i]).filename()).string());
-    const Points seen =
-        points_from_depth(load_depth_image(files[i]), mask, camera, frames.depth_scale, files[i]);
+    if (!frames.masks.empty()) mask = load_mask(mask_of(frames.masks, files[i]));
+    const Points seen = points_from_depth(load_depth(files[i], frames.depth_scale), mask, camera, files[i]);
     append(coordinates, (seen * poses[i].linear().transpose()).rowwise() + poses[i].translation().transpose(),
            files[i]);
   }

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "data/atomic_file.h"
+#include "data/depth_map.h"
 #include "data/error.h"
 #include "data/extrinsics.h"
 #include "data/json_reader.h"
@@ -173,15 +174,18 @@ void import_frames(const ImportSettings& settings, data::Recording& recording) {
     data::RecordedKeyframe keyframe;
     keyframe.time = settings.times.empty() ? static_cast<double>(i) / kRate : settings.times[i];
     (depth ? keyframe.depth : keyframe.cloud) = frames[i];
-    if (!settings.masks.empty())
-      keyframe.mask = (fs::path(settings.masks) / fs::path(frames[i]).filename()).string();
+    if (!settings.masks.empty()) keyframe.mask = data::mask_of(settings.masks, frames[i]);
     recording.keyframes.push_back(keyframe);
   }
   if (!depth) return;
   data::RecordedCamera camera;
-  camera.intrinsics = data::load_camera_intrinsics(settings.intrinsics);
-  camera.intrinsics_path = settings.intrinsics;
   const data::CameraPose pose = data::load_camera_pose(settings.extrinsics, settings.accept_unusable);
+  std::optional<data::LensOfFile> own;
+  if (!settings.intrinsics.empty())
+    own = {data::load_depth_lens(settings.intrinsics, settings.depth.front()), settings.intrinsics};
+  const data::PosedLens lens = data::posed_lens(pose, settings.extrinsics, own, settings.lens);
+  if (!lens.notice.empty()) recording.notices.push_back(lens.notice);
+  camera.intrinsics = lens.lens;
   camera.base_from_camera = pose.transform.T;
   camera.warnings = pose.warnings;
   if (!pose.usable)
@@ -197,7 +201,9 @@ void import_frames(const ImportSettings& settings, data::Recording& recording) {
 void copy_files(const fs::path& out, data::Recording& recording) {
   for (std::size_t i = 0; i < recording.keyframes.size(); ++i) {
     data::RecordedKeyframe& keyframe = recording.keyframes[i];
-    if (!keyframe.depth.empty()) keyframe.depth = copied(keyframe.depth, out / "depth" / numbered(i, ".png"));
+    if (!keyframe.depth.empty())
+      keyframe.depth =
+          copied(keyframe.depth, out / "depth" / numbered(i, data::lower_extension(keyframe.depth).c_str()));
     if (!keyframe.mask.empty()) keyframe.mask = copied(keyframe.mask, out / "mask" / numbered(i, ".png"));
     if (keyframe.cloud.empty()) continue;
     const std::string copy = (out / "frames" / numbered(i, ".ply")).string();

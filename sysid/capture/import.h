@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "data/mesh.h"
+#include "data/posed_lens.h"
 #include "data/recording.h"
 #include "data/trajectory.h"
 
@@ -15,9 +16,10 @@ struct ImportSettings {
   std::vector<std::string> clouds;  ///< .ply or .pcd in the base frame, in order of time; or
   std::vector<std::string> depth;   ///< 16-bit .png in the camera frame, in order of time, with
   std::string masks;                ///< a folder of masks of the same names, may be empty
-  std::string intrinsics;           ///< camera_info or OpenCV YAML
-  std::string extrinsics;           ///< T_base_camera: extrinsics JSON, or a TUM file whose first pose counts
-  double depth_scale = 0.001;       ///< [m] a count
+  std::string intrinsics;           ///< camera_info or OpenCV YAML; may be empty where extrinsics hold a lens
+  data::LensChoice lens = data::LensChoice::agreeing;
+  std::string extrinsics;      ///< T_base_camera: extrinsics JSON, or a TUM file whose first pose counts
+  double depth_scale = 0.001;  ///< [m] a count
 
   std::vector<double> times;    ///< one a frame, increasing [s]; empty: 10 a second, and a notice
   data::Trajectory trajectory;  ///< T_base_gripper, two poses or more

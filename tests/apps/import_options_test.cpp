@@ -158,7 +158,7 @@ TEST_F(ImportOptionsOfAFolder, AreRefusedByTheirNames) {
             options_.clouds + ": found no .png files for --depth");
   folder_.write("depth/a.png", "");
   EXPECT_EQ(message_of([&](ImportOptions& o) { o.depth = folder_ / "depth", o.clouds = ""; }),
-            "import: --depth needs --intrinsics and --extrinsics");
+            "import: --depth needs --extrinsics, and --intrinsics where these hold no lens");
 }
 
 }  // namespace

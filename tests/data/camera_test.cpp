@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "data/atomic_file.h"
-#include "data/depth_image.h"
+#include "data/depth_map.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -184,11 +184,11 @@ TEST(DepthImage, ACameraThatSeesNothingNearIsRefused) {
   const DepthImage depth{4, 3, std::vector<std::uint16_t>(12, 1000)};
   camera.fx = camera.fy = 1e-300;
   EXPECT_EQ(
-      input_error_of([&] { points_from_depth(depth, {}, camera, 0.001, "d.png"); }),
+      input_error_of([&] { points_from_depth(in_metres(depth, 0.001), {}, camera, "d.png"); }),
       "d.png: 12 of 12 pixels become points more than 100 km away, or none: check the camera's matrix and "
       "distortion, and the depth scale");
   camera.fx = camera.fy = 5;
-  EXPECT_EQ(points_from_depth(depth, {}, camera, 0.001, "d.png").rows(), 12);
+  EXPECT_EQ(points_from_depth(in_metres(depth, 0.001), {}, camera, "d.png").rows(), 12);
 }
 
 TEST(DepthImage, PointsLieWhereTheirPixelsLook) {
@@ -201,14 +201,14 @@ TEST(DepthImage, PointsLieWhereTheirPixelsLook) {
   depth.at(2, 1) = 1500;
   depth.at(3, 0) = 800;
   MaskImage mask{4, 3, std::vector<std::uint8_t>(12, 0)};
-  EXPECT_EQ(points_from_depth(depth, {}, camera, 0.001, "d.png").rows(), 2);
+  EXPECT_EQ(points_from_depth(in_metres(depth, 0.001), {}, camera, "d.png").rows(), 2);
   mask.at(2, 1) = 1;
-  const Points points = points_from_depth(depth, mask, camera, 0.001, "d.png");
+  const Points points = points_from_depth(in_metres(depth, 0.001), mask, camera, "d.png");
   ASSERT_EQ(points.rows(), 1);
   EXPECT_DOUBLE_EQ(points(0, 2), 1.5);
   EXPECT_LT((*project(camera, points.row(0)) - Eigen::Vector2d(2, 1)).norm(), 1e-9);
   camera.width = 5;
-  EXPECT_EQ(input_error_of([&] { points_from_depth(depth, mask, camera, 0.001, "d.png"); }),
+  EXPECT_EQ(input_error_of([&] { points_from_depth(in_metres(depth, 0.001), mask, camera, "d.png"); }),
             "d.png: found 4 x 3 pixels, expected the camera's 5 x 3");
 }
 

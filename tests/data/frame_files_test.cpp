@@ -54,9 +54,9 @@ TEST(FrameFiles, TimesAreAColumnOfAFile) {
   folder.write("times.csv", "frame,t\n0,0.01\n1,0.01\n");
   EXPECT_EQ(input_error_of([&] { load_frame_times(path, 2); }),
             path + ": line 3: found \"1,0.01\", expected strictly increasing times");
-  folder.write("times.csv", "frame,time\n0,0.01\n");
+  folder.write("times.csv", "frame,when\n0,0.01\n");
   EXPECT_EQ(input_error_of([&] { load_frame_times(path, 1); }),
-            path + ": header: found \"frame,time\", expected a column t or t_s");
+            path + ": header: found \"frame,when\", expected a column t or t_s");
 }
 
 Trajectory between(double begin, double end) {

@@ -71,7 +71,8 @@ TEST(Trajectory, MalformedFilesAreNamedByLine) {
             ": line 1: quaternion has length 2, expected 1 (order qx qy qz qw)");
   EXPECT_EQ(message("a.tum", "0 0 nan 0 0 0 0 1\n"), ": line 1, ty: found \"nan\", expected a finite number");
   EXPECT_EQ(message("a.csv", "t,tx,ty,tz,qx,qy,qz\n"),
-            ": header: column \"qw\" is missing, expected t,tx,ty,tz,qx,qy,qz,qw");
+            ": header: found t, tx, ty, tz, qx, qy, qz, and with them no rotation, expected qx,qy,qz,qw or "
+            "rx,ry,rz or rotvec_x,rotvec_y,rotvec_z");
   EXPECT_EQ(message("a.csv", "t,tx,ty,tz,qx,qy,qz,qw\n1,2\n"), ": line 2: found 2 columns, expected 8");
   EXPECT_NE(input_error_of([&] { load_trajectory(folder / "none.tum"); }).find("No such file"),
             std::string::npos);

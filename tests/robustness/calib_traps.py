@@ -459,7 +459,7 @@ def wrongly_told(calib, work):
             yield f"a terminal is not told {line!r}: {terminal!r}"
     if not terminal.endswith("\r\033[K"):
         yield f"the line of progress is left behind: {terminal!r}"
-    focal = re.search(r"focal lengths ([\d.]+) \+- ([\d.]+), ([\d.]+) \+- ([\d.]+) px", stdout)
+    focal = re.search(r"lens: fx ([\d.]+) \+- ([\d.]+), fy ([\d.]+) \+- ([\d.]+), cx ", stdout)
     if not focal:
         yield f"no focal lengths: {stdout}"
     for length, sd in zip(focal.groups()[::2], focal.groups()[1::2]) if focal else ():

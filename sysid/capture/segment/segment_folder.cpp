@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "data/atomic_file.h"
-#include "data/depth_image.h"
+#include "data/depth_map.h"
 #include "data/error.h"
 #include "data/extrinsics.h"
 #include "data/frame_files.h"
@@ -175,6 +175,19 @@ std::string frame_name(int frame) {
   return name;
 }
 
+/// Of depth images, whose camera is at `pose`.
+void take_lens(const data::CameraPose& pose, const std::string& pose_path, const RawViewFiles& given,
+               RawView& view) {
+  const std::string beside = (fs::path(view.folder) / "camera_info.yaml").string();
+  const std::string path = given.intrinsics.empty() ? beside : given.intrinsics;
+  std::optional<data::LensOfFile> own;
+  if (!pose.lens || !given.intrinsics.empty() || fs::exists(beside))
+    own = {data::load_depth_lens(path, view.files.front()), path};
+  const data::PosedLens lens = data::posed_lens(pose, pose_path, own, given.lens);
+  view.camera = lens.lens;
+  if (!lens.notice.empty()) view.warnings.push_back(lens.notice);
+}
+
 }  // namespace
 
 RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
@@ -188,28 +201,26 @@ RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
       if (!path.empty())
         throw data::InputError(folder + ": holds clouds, " + option + " is for depth images");
   } else {
-    view.files = first_with(folder, {"depth", ""}, {".png"});
+    view.files = first_with(folder, {"depth", ""}, data::depth_endings());
     if (view.files.empty())
-      throw data::input_error(folder, "folder",
-                              "found neither clouds (.ply, .pcd) nor 16-bit depth images (.png)");
-    view.camera = data::load_camera_intrinsics(
-        given.intrinsics.empty() ? (fs::path(folder) / "camera_info.yaml").string() : given.intrinsics);
+      throw data::input_error(
+          folder, "folder", "found neither clouds (.ply, .pcd) nor depth images (16-bit .png, .npy, .tiff)");
     view.depth_scale = given.depth_scale.value_or(view.depth_scale);
   }
   if (!given.masks.empty())
-    for (const std::string& file : view.files)
-      view.masks.push_back((fs::path(given.masks) / fs::path(file).filename()).string());
+    for (const std::string& file : view.files) view.masks.push_back(data::mask_of(given.masks, file));
   std::string extrinsics = given.extrinsics;
   for (const char* name : {"extrinsics.json", "extrinsics.tum"})
     if (const fs::path path = fs::path(folder) / name; extrinsics.empty() && fs::exists(path))
       extrinsics = path.string();
+  if (!clouds && extrinsics.empty())
+    throw data::input_error((fs::path(folder) / "extrinsics.json").string(), "file",
+                            "missing: depth images need the pose of their camera, here or as --extrinsics");
   if (!extrinsics.empty()) {
     const data::CameraPose pose = data::load_camera_pose(extrinsics, given.accept_unusable);
     view.base_from_camera = pose.transform.T;
     for (const std::string& warning : pose.warnings) view.warnings.push_back(extrinsics + ": " + warning);
-  } else if (!clouds) {
-    throw data::input_error((fs::path(folder) / "extrinsics.json").string(), "file",
-                            "missing: depth images need the pose of their camera, here or as --extrinsics");
+    if (!clouds) take_lens(pose, extrinsics, given, view);
   }
   return view;
 }
@@ -221,8 +232,7 @@ data::Points load_raw_frame(const RawView& view, int frame, bool masked, std::si
   if (view.camera) {
     const data::MaskImage mask =
         masked && !view.masks.empty() ? data::load_mask(view.masks[frame]) : data::MaskImage{};
-    points =
-        data::points_from_depth(data::load_depth_image(file), mask, *view.camera, view.depth_scale, file);
+    points = data::points_from_depth(data::load_depth(file, view.depth_scale), mask, *view.camera, file);
   } else {
     points = data::load_point_cloud(file, not_finite);
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "data/camera.h"
+#include "data/posed_lens.h"
 #include "data/trajectory.h"
 #include "sysid/capture/segment/segment.h"
 
@@ -19,7 +20,7 @@ struct RawView {
   std::optional<data::CameraIntrinsics> camera;  ///< of depth images; clouds need none
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< T_base_camera
   double depth_scale = 0.001;                                          ///< [m] a count
-  std::vector<std::string> warnings;                                   ///< of the calibration of the camera
+  std::vector<std::string> warnings;  ///< of the calibration of the camera and of its lens
 };
 
 /// What is not found in a view's folder, or counts in its place; empty where not given. As for `import`.
@@ -27,13 +28,15 @@ struct RawViewFiles {
   std::string masks;       ///< folder of masks with the names of the depth images
   std::string intrinsics;  ///< camera_info or OpenCV YAML
   std::string extrinsics;  ///< T_base_camera: extrinsics JSON, or a TUM file whose first pose counts
+  data::LensChoice lens = data::LensChoice::agreeing;
   std::optional<double> depth_scale;  ///< [m] a count
   bool accept_unusable = false;       ///< extrinsics that flash-calib ended with exit code 3
 };
 
 /// Finds what a folder holds: clouds in it (or in clouds/, frames/), else depth images in depth/ (or in it)
-/// with camera_info.yaml beside them. T_base_camera comes from `extrinsics.json` or `extrinsics.tum`; clouds
-/// without one are taken as they stand, in the base frame. Throws InputError naming what is missing.
+/// with camera_info.yaml beside them. T_base_camera comes from `extrinsics.json` or `extrinsics.tum`, and
+/// with it the lens that it holds with (posed_lens.h); clouds without one are taken as they stand, in the
+/// base frame. Throws InputError naming what is missing, or the two lenses.
 RawView open_raw_view(const std::string& folder, const RawViewFiles& given = {});
 
 /// One frame in the base frame [m]; depth pixels of zero, what is masked and points that are not finite are

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "calib/calibrate/calibrate.h"
-#include "calib/dataset/pose_file.h"
 #include "data/error.h"
+#include "data/rotation_angles.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {
@@ -13,7 +13,7 @@ using Mount = calib::Setup;  // testing::Test has a private member of the name S
 
 /// The three numbers that this convention writes for a rotation.
 Eigen::Vector3d written(const Eigen::Matrix3d& R, const std::string& order) {
-  if (order == kRotationVector) return rotation_log(R);
+  if (order == data::kRotationVector) return rotation_log(R);
   const bool turning = order.front() < 'a';
   const auto axis = [&](std::size_t k) {
     return static_cast<Eigen::Index>(order[k] - (turning ? 'X' : 'x'));
@@ -24,7 +24,7 @@ Eigen::Vector3d written(const Eigen::Matrix3d& R, const std::string& order) {
 }
 
 class Conventions : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(Angles, Conventions, testing::ValuesIn(angle_orders()),
+INSTANTIATE_TEST_SUITE_P(Angles, Conventions, testing::ValuesIn(data::angle_orders()),
                          [](const auto& order) { return order.param; });
 
 TEST_P(Conventions, AreReadAsTheyAreWritten) {
@@ -32,7 +32,7 @@ TEST_P(Conventions, AreReadAsTheyAreWritten) {
   for (int i = 0; i < 20; ++i) {
     const Eigen::Matrix3d R = Eigen::Quaterniond::UnitRandom().toRotationMatrix();
     // Rounding is amplified near a gimbal lock; 20 draws stay 1e-3 away from it.
-    EXPECT_LT((rotation_from_angles(written(R, GetParam()), GetParam()) - R).norm(), 1e-9);
+    EXPECT_LT((data::rotation_from_angles(written(R, GetParam()), GetParam()) - R).norm(), 1e-9);
   }
 }
 
@@ -45,7 +45,7 @@ TEST_P(Conventions, TakenForFixedXyzAreNamed) {
     CalibrateSettings calibrate_settings;
     for (Observation& o : scene.observations) {
       calibrate_settings.angles.push_back(written(o.T_base_gripper.linear(), GetParam()));
-      o.T_base_gripper.linear() = rotation_from_angles(calibrate_settings.angles.back());
+      o.T_base_gripper.linear() = data::rotation_from_angles(calibrate_settings.angles.back());
     }
     const auto solve = [&] {
       return calibrate(setup, scene.camera, scene.points, grid_symmetries(scene.points), scene.observations,
@@ -74,7 +74,7 @@ TEST(ConventionCheck, OffersNothingWhereNothingCloses) {
     CalibrateSettings settings;
     for (Observation& o : scene.observations) {
       settings.angles.emplace_back(uniform(random), uniform(random), uniform(random));
-      o.T_base_gripper.linear() = rotation_from_angles(settings.angles.back());
+      o.T_base_gripper.linear() = data::rotation_from_angles(settings.angles.back());
     }
     try {
       const Calibration result = calibrate(Mount::eye_in_hand, scene.camera, scene.points,
@@ -103,7 +103,7 @@ TEST(ConventionCheck, AnswerThatIsNoneNamesTheColumns) {
       CalibrateSettings settings;
       for (Observation& o : scene.observations) {
         settings.angles.push_back(written(o.T_base_gripper.linear(), "ZYX"));
-        o.T_base_gripper.linear() = rotation_from_angles(settings.angles.back());
+        o.T_base_gripper.linear() = data::rotation_from_angles(settings.angles.back());
       }
       std::string said;
       try {

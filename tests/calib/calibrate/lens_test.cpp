@@ -87,6 +87,25 @@ TEST_P(Lens, FocalLengthFivePercentOffIsFoundAndSaid) {
   EXPECT_LT(found.centre_rms, 1.2 * found.chain_rms);  // and what the pose adds by its own noise
 }
 
+// The lens as stated, by the covariance of the answer and by an answer for that lens.
+TEST_P(Lens, HowFarOffTheStatedLensWouldPutTheCameraIsWhatARefitSays) {
+  const HandEyeScene scene = scene_of(GetParam(), 36);
+  data::CameraIntrinsics stated = scene.camera;
+  stated.fx *= 1.004;
+  stated.fy *= 1.004;
+  stated.cx += 2;
+  const Calibration found = calibrated(scene, stated);
+  CalibrateSettings settings;
+  settings.lens = LensKnowledge::stated;
+  const Calibration kept = calibrated(scene, stated, settings);
+  const Vector6d refit = motion_between(found.poses.X, kept.poses.X);
+  EXPECT_GT(refit.head<3>().norm(), 5e-4);
+  // The refit weighs corners and robot anew; what is seen is how far, to a quarter.
+  EXPECT_LT((found.lens.camera_shift - refit).head<3>().norm(), 0.25 * refit.head<3>().norm());
+  EXPECT_LT((found.lens.camera_shift - refit).tail<3>().norm(), 0.25 * refit.tail<3>().norm());
+  EXPECT_EQ(kept.lens.camera_shift.norm(), 0);
+}
+
 TEST_P(Lens, DistortionThatIsMissingIsFoundAndSaid) {
   const HandEyeScene scene = scene_of(GetParam(), 33);
   data::CameraIntrinsics stated = scene.camera;

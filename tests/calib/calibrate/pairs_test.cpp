@@ -23,6 +23,25 @@ std::vector<Observation> pairs_of(const HandEyeScene& scene) {
   return pairs;
 }
 
+// Nothing closes, so nothing closes to 0.0 deg either.
+TEST(Pairs, FourRandomOnesAreToldToTurnByOtherAngles) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto drawn = [&] {
+    return make_pose({uniform(random), uniform(random), 1 + uniform(random)},
+                     M_PI / 2 * Eigen::Vector3d(uniform(random), uniform(random), uniform(random)));
+  };
+  std::vector<Observation> pairs(4);
+  for (Observation& pair : pairs) {
+    pair.pixels.resize(2, 0);
+    pair.T_base_gripper = drawn();
+    pair.T_camera_target = {drawn()};
+  }
+  const std::string said = data::input_error_of([&] { calibrate_pairs(Mount::eye_to_hand, pairs); });
+  EXPECT_EQ(said.find("0.0 deg and 0 mm"), std::string::npos) << said;
+  EXPECT_NE(said.find("do not tell of the same motion"), std::string::npos) << said;
+}
+
 /// Robot and target as they truly stand, but for noise of 0.05 deg and 0.5 mm, at gripper poses of turns by
 /// half a circle about three axes.
 HandEyeScene half_turns_scene() {

@@ -5,8 +5,8 @@
 #include <functional>
 
 #include "calib/calibrate/calibrate.h"
-#include "calib/dataset/pose_file.h"
 #include "data/error.h"
+#include "data/rotation_angles.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {
@@ -160,7 +160,7 @@ TEST_P(Traps, DegreesForRadiansAndOrdersOfAnglesAreNamed) {
     for (Observation& o : scene.observations) {
       const Eigen::Vector3d angles = trap.written(o.T_base_gripper.linear());
       settings.angles.push_back(angles);
-      o.T_base_gripper.linear() = rotation_from_angles(angles);
+      o.T_base_gripper.linear() = data::rotation_from_angles(angles);
     }
     EXPECT_TRUE(refusal(scene, settings).starts_with(trap.start)) << refusal(scene, settings);
   }
@@ -205,7 +205,7 @@ TEST_P(Traps, AnglesInWrongColumnsAreNoAnswer) {
     for (Observation& o : scene.observations) {
       const Eigen::Vector3d kuka = o.T_base_gripper.linear().eulerAngles(2, 1, 0);
       settings.angles.push_back(kuka);
-      o.T_base_gripper.linear() = rotation_from_angles(kuka);
+      o.T_base_gripper.linear() = data::rotation_from_angles(kuka);
     }
     EXPECT_TRUE(refused(scene, settings)) << seed;
   }

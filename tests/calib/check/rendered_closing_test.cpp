@@ -140,7 +140,8 @@ TEST(CloudCheck, FortyViewsAreAsThinAsOne) {
     for (const double z : renderer.depth(set.true_poses[v]))
       depth.pixels.push_back(z > 0 ? static_cast<std::uint16_t>(std::lround((z + noise(random)) / kCount))
                                    : 0);
-    clouds.push_back(target_cloud(depth, kCount, set.images[v], camera, set.observations[v]));
+    clouds.push_back(
+        target_cloud(data::in_metres(depth, kCount), set.images[v], camera, set.observations[v]));
     robot.push_back(set.observations[v].T_base_gripper);
   }
   const CloudCheck right = check_clouds(set.setup, calibration.poses.X, clouds, robot);

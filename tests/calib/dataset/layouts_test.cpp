@@ -5,10 +5,12 @@
 #include <filesystem>
 
 #include "calib/dataset/dataset.h"
-#include "calib/dataset/intrinsics_file.h"
-#include "calib/dataset/npz.h"
 #include "data/error.h"
+#include "data/extrinsics.h"
+#include "data/intrinsics_file.h"
+#include "data/npz.h"
 #include "data/picture.h"
+#include "data/trajectory.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
@@ -108,6 +110,98 @@ TEST(Layouts, HeadersOfManyProgramsAreRead) {
     write_pictures(folder);
     folder.write("poses.csv", c.text);
     expect_read(folder, c.guess);
+  }
+}
+
+// One reader serves flash-calib (load_dataset) and flash-sysid (load_trajectory, load_camera_pose).
+TEST(Layouts, PosesOverTimeAreReadAlikeByBothPrograms) {
+  struct Case {
+    const char *file, *text;
+  };
+  const Case cases[] = {
+      {"poses.tum", "1700000000 0.1 0.2 0.3 0 0 0.7071068 0.7071068\n1700000000.25 0.4 0.5 0.6 0 0 0 1\n"},
+      {"poses.txt",
+       "# t tx ty tz qw qx qy qz\n1700000000 0.1 0.2 0.3 0.7071068 0 0 0.7071068\n1700000000.25 0.4 0.5 0.6 "
+       "1 "
+       "0 0 0\n"},
+      {"poses.tum",
+       "1700000000000000000 0.1 0.2 0.3 0 0 0.7071068 0.7071068\n1700000000250000000 0.4 0.5 0.6 0 0 0 1\n"},
+      {"poses.csv",
+       "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n"
+       "1700000000000000000,0.1,0.2,0.3,0.7071068,0,0,0.7071068\n1700000000250000000,0.4,0.5,0.6,1,0,0,0\n"},
+      {"poses.csv",
+       "# by hand\ntime;qw;qx;qy;qz;x;y;z\n1700000000;0.7071068;0;0;0.7071068;0.1;0.2;0.3\n"
+       "1700000000.25;1;0;0;0;0.4;0.5;0.6\n"},
+      {"poses.csv",
+       "t,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n1700000000,100,200,300,0,0,90\n"
+       "1700000000.25,400,500,600,0,0,0\n"},
+      {"poses.txt",
+       "1700000000 0 -1 0 0.1 1 0 0 0.2 0 0 1 0.3 0 0 0 1\n1700000000.25 1 0 0 0.4 0 1 0 0.5 0 0 1 0.6 0 0 0 "
+       "1\n"},
+      {"poses.csv",
+       "1700000000000000000,0,-1,0,0.1,1,0,0,0.2,0,0,1,0.3\n1700000000250000000,1,0,0,0.4,0,1,0,0.5,0,0,1,0."
+       "6\n"},
+      {"poses.json",
+       R"([{"t": 1700000000, "pose": [[0,-1,0,0.1],[1,0,0,0.2],[0,0,1,0.3],[0,0,0,1]]},
+           {"t": 1700000000.25, "x": 0.4, "y": 0.5, "z": 0.6, "qx": 0, "qy": 0, "qz": 0, "qw": 1}])"},
+      {"poses.json",
+       R"({"poses": [{"timestamp": 1700000000000000000, "position": [0.1, 0.2, 0.3],
+                      "orientation": {"w": 0.7071068, "x": 0, "y": 0, "z": 0.7071068}},
+                     {"timestamp": 1700000000250000000, "translation": {"x": 0.4, "y": 0.5, "z": 0.6},
+                      "rotation": [[1,0,0],[0,1,0],[0,0,1]]}]})"},
+  };
+  for (const Case& c : cases) {
+    const data::TemporaryFolder folder;
+    write_pictures(folder, "images", {"1700000000.000000.png", "1700000000.250000.png"});
+    const std::string path = folder.write(c.file, c.text);
+    const data::Trajectory trajectory = data::load_trajectory(path);
+    ASSERT_EQ(trajectory.times.size(), 2U) << c.text;
+    // A double of seconds since 1970 is told to a quarter of a microsecond.
+    EXPECT_NEAR(trajectory.times[1] - trajectory.times[0], 0.25, 1e-6) << c.text;
+    EXPECT_TRUE(trajectory.poses[0].isApprox(quarter(), 1e-6)) << c.text;
+    EXPECT_TRUE(data::load_camera_pose(path, false).transform.T.isApprox(quarter(), 1e-6)) << c.text;
+    const Dataset dataset = load_dataset(folder / "");
+    ASSERT_EQ(dataset.frames.size(), 2U) << c.text;
+    for (std::size_t i = 0; i < 2; ++i)
+      EXPECT_TRUE(dataset.frames[i].T_base_gripper.isApprox(trajectory.poses[i], 1e-6)) << c.text;
+  }
+}
+
+TEST(Layouts, PosesWithoutTimesAreNoTrajectory) {
+  const data::TemporaryFolder folder;
+  for (const auto& [name, text] :
+       {std::pair("a.csv", "index,x,y,z,qx,qy,qz,qw\n1,0,0,0,0,0,0,1\n2,0,0,0,0,0,0,1\n"),
+        {"b.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 0\n"},
+        {"c.json", R"([[0, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0, 1]])"}}) {
+    const std::string path = folder.write(name, text);
+    EXPECT_EQ(data::input_error_of([&] { data::load_trajectory(path); }),
+              path + ": found 2 poses without times, expected a time before each, as t tx ty tz qx qy qz qw");
+  }
+}
+
+TEST(Layouts, NumbersInTheMiddleOfNamesOrderPicturesOfBarePoses) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder, "images", {"img1_cam1.png", "img2_cam1.png", "img10_cam1.png"});
+  folder.write("poses.txt", "0.1 0 0 0 0 0 1\n0.2 0 0 0 0 0 1\n1 0 0 0 0 0 1\n");
+  const Dataset dataset = load_dataset(folder / "");
+  ASSERT_EQ(dataset.frames.size(), 3U);
+  for (const auto& [i, name, x] :
+       {std::tuple(0, "img1_cam1.png", 0.1), {1, "img2_cam1.png", 0.2}, {2, "img10_cam1.png", 1.0}}) {
+    const Frame& frame = dataset.frames[static_cast<std::size_t>(i)];
+    EXPECT_EQ(frame.name, name);
+    EXPECT_EQ(frame.T_base_gripper.translation().x(), x);
+  }
+}
+
+TEST(Layouts, DepthOfRealNumbersIsFoundBesideThePictures) {
+  for (const char* ending : {".png", ".npy", ".tif", ".tiff"}) {
+    const data::TemporaryFolder folder;
+    write_pictures(folder);
+    folder.write("poses.tum", "9 0 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+    folder.write(std::string("depth/a_9") + ending, "");
+    const Dataset dataset = load_dataset(folder / "");
+    EXPECT_EQ(std::filesystem::path(dataset.frames[0].depth).extension(), ending);
+    EXPECT_EQ(dataset.frames[1].depth, "");
   }
 }
 
@@ -293,10 +387,21 @@ TEST(Layouts, IntrinsicsOfManyKinds) {
       folder.write(
           "parts.json",
           R"({"intrinsics": {"fx": 10, "fy": 11, "ppx": 4, "ppy": 3, "coeffs": [-0.1, 0.01, 0.001, 0.002, 0]}})"),
+      folder.write(
+          "parts.yaml",
+          "Camera:\n  fx: 10\n  fy: 11\n  cx: 4\n  cy: 3\n  k1: -0.1\n  k2: 0.01\n  p1: 0.001\n  p2: "
+          "0.002\n"),
+      folder.write(
+          "model.yaml",
+          "camera_matrix: [10, 0, 4, 0, 11, 3, 0, 0, 1]\ndistortion: {model: plumb_bob, coefficients: "
+          "[-0.1, 0.01, 0.001, 0.002, 0]}\n"),
+      folder.write(
+          "capitals.json",
+          R"({"Intrinsic": [[10,0,4],[0,11,3],[0,0,1]], "Distortion": [-0.1, 0.01, 0.001, 0.002, 0]})"),
       folder.write("numpy.npz",
                    npz({{"mtx", {10, 0, 4, 0, 11, 3, 0, 0, 1}}, {"dist", {-0.1, 0.01, 0.001, 0.002, 0}}}))};
   for (const std::string& file : files) {
-    const data::CameraIntrinsics camera = load_intrinsics(file);
+    const data::CameraIntrinsics camera = data::load_intrinsics(file);
     EXPECT_EQ(camera.width, 0) << file;
     EXPECT_EQ(camera.fx, 10) << file;
     EXPECT_EQ(camera.fy, 11) << file;
@@ -304,7 +409,7 @@ TEST(Layouts, IntrinsicsOfManyKinds) {
     EXPECT_EQ(camera.cy, 3) << file;
     EXPECT_EQ(camera.distortion, (std::vector<double>{-0.1, 0.01, 0.001, 0.002, 0})) << file;
   }
-  EXPECT_EQ(load_intrinsics(folder.write("camera_info.yaml", kCamera)).width, 8);
+  EXPECT_EQ(data::load_intrinsics(folder.write("camera_info.yaml", kCamera)).width, 8);
 }
 
 TEST(Layouts, WithoutIntrinsicsTheVerbThatMakesThemIsNamed) {
@@ -319,15 +424,22 @@ TEST(Layouts, WithoutIntrinsicsTheVerbThatMakesThemIsNamed) {
 TEST(Layouts, IntrinsicsThatAreNoneAreNamed) {
   const data::TemporaryFolder folder;
   EXPECT_NE(data::input_error_of([&] {
-              load_intrinsics(folder.write("a.json", R"({"rms": 1})"));
+              data::load_intrinsics(folder.write("a.json", R"({"rms": 1})"));
             }).find("camera_matrix: missing"),
             std::string::npos);
   EXPECT_NE(data::input_error_of([&] {
-              load_intrinsics(folder.write("b.json", R"({"K": [[10,1,4],[0,11,3],[0,0,1]]})"));
+              data::load_intrinsics(folder.write("b.json", R"({"K": [[10,1,4],[0,11,3],[0,0,1]]})"));
             }).find("expected 3 x 3"),
             std::string::npos);
+  for (const char* distortion : {"distortion_model: fisheye", "distortion: {model: equidistant}"}) {
+    const std::string said = data::input_error_of([&] {
+      data::load_intrinsics(
+          folder.write("d.yaml", std::string("{fx: 1, fy: 1, cx: 1, cy: 1, D: [0.1], ") + distortion + "}"));
+    });
+    EXPECT_NE(said.find("expected plumb_bob, rational_polynomial or none"), std::string::npos) << said;
+  }
   for (const std::string& text : {std::string("no archive"), npz({{"mtx", {10}}}).substr(0, 60)})
-    EXPECT_THROW(load_intrinsics(folder.write("c.npz", text)), data::InputError);
+    EXPECT_THROW(data::load_intrinsics(folder.write("c.npz", text)), data::InputError);
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/dataset/pose_file.h"
+#include "calib/dataset/joint_list.h"
 #include "calib/geometry/pose.h"
 #include "data/error.h"
 #include "tests/data/temporary_folder.h"
@@ -92,14 +92,14 @@ TEST_F(Urdf, JointsBesideTheChainMayBeOfAnyKind) {
 
 TEST_F(Urdf, JointsAreReadByNameOrNumber) {
   const SerialChain chain = load_urdf(write("arm.urdf", kArm), "base", "tool");
-  const PoseList named = load_joint_list(
+  const data::PoseList named = load_joint_list(
       write("joints.csv", "image,rail,elbow_deg,shoulder\n000.png,0.12,-30,0.4\n001.png,0,0,0\n"), chain);
   ASSERT_EQ(named.poses.size(), 2U);
   EXPECT_EQ(named.poses[0].image, "000.png");
   const Eigen::Vector3d q(0.4, -M_PI / 6, 0.12);
   EXPECT_TRUE(named.poses[0].joints.isApprox(q, 1e-12));
   EXPECT_TRUE(named.poses[0].pose.isApprox(gripper_pose(chain, q), 1e-12));
-  const PoseList numbered = load_joint_list(write("q.csv", "index;q1;q2;q3\n7;0.4;-0.5;0.12\n"), chain);
+  const data::PoseList numbered = load_joint_list(write("q.csv", "index;q1;q2;q3\n7;0.4;-0.5;0.12\n"), chain);
   EXPECT_EQ(numbered.poses[0].stamp, 7);
   EXPECT_EQ(numbered.poses[0].joints, Eigen::Vector3d(0.4, -0.5, 0.12));
   EXPECT_NE(data::input_error_of([&] {

@@ -54,7 +54,8 @@ TEST(BoardDepth, ThreePlacesAreIndependentAndCarryWhatAllPixelsKnow) {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   int pixels = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
-    const BoardDepth depth = board_depth(scene.draw(kNoise), kScale, scene.scene.camera, scene.view);
+    const BoardDepth depth =
+        board_depth(data::in_metres(scene.draw(kNoise), kScale), scene.scene.camera, scene.view);
     ASSERT_EQ(depth.points.cols(), 3);
     pixels = depth.pixels;
     // Pixels beyond four sigma, 1 in 16,000, are left out.
@@ -82,7 +83,7 @@ TEST(BoardDepth, FlyingPixelsAndHolesAreLeftOut) {
     if (u < 0.2) count = 0;
     if (u > 0.9) count = static_cast<std::uint16_t>(1.3 * count);
   }
-  const BoardDepth board = board_depth(depth, kScale, scene.scene.camera, scene.view);
+  const BoardDepth board = board_depth(data::in_metres(depth, kScale), scene.scene.camera, scene.view);
   ASSERT_EQ(board.points.cols(), 3);
   EXPECT_NEAR(board.noise, 1e-3, 5e-5);
   EXPECT_LT(scene.errors(board).cwiseAbs().maxCoeff(), 5 * 1e-3 * std::sqrt(3.0 / board.pixels));
@@ -90,7 +91,8 @@ TEST(BoardDepth, FlyingPixelsAndHolesAreLeftOut) {
 
 TEST(BoardDepth, PlacesLieWithinTheOutline) {
   DepthScene scene;
-  const BoardDepth board = board_depth(scene.draw(0), kScale, scene.scene.camera, scene.view);
+  const BoardDepth board =
+      board_depth(data::in_metres(scene.draw(0), kScale), scene.scene.camera, scene.view);
   const Eigen::Vector3d low = scene.scene.points.rowwise().minCoeff(),
                         high = scene.scene.points.rowwise().maxCoeff();
   for (int k = 0; k < 3; ++k) {
@@ -111,10 +113,10 @@ TEST(BoardDepth, UnregisteredDepthIsRefusedAndNoDepthIsNone) {
   depth.width = 4;
   depth.height = 3;
   depth.pixels.assign(12, 500);
-  EXPECT_THROW(board_depth(depth, kScale, scene.scene.camera, scene.view), data::InputError);
+  EXPECT_THROW(board_depth(data::in_metres(depth, kScale), scene.scene.camera, scene.view), data::InputError);
   depth = scene.draw(0);
   std::fill(depth.pixels.begin(), depth.pixels.end(), std::uint16_t{0});
-  EXPECT_EQ(board_depth(depth, kScale, scene.scene.camera, scene.view).points.cols(), 0);
+  EXPECT_EQ(board_depth(data::in_metres(depth, kScale), scene.scene.camera, scene.view).points.cols(), 0);
 }
 
 TEST(PixelsWithin, AreThoseOfTheHull) {

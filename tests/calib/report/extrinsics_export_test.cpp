@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "tests/calib/hand_eye_scene.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
 namespace {
@@ -35,6 +36,25 @@ TEST(ExtrinsicsExport, RosUrdfAndEasyHandeyeSayTheSameTransform) {
     EXPECT_NE(calib.find("calibration_type: eye_in_hand"), std::string::npos);
     EXPECT_NE(calib.find("robot_effector_frame: tool0"), std::string::npos);
   }
+}
+
+TEST(ExtrinsicsExport, EachCarriesTheLensThatItsTransformHoldsWith) {
+  const data::NamedTransform transform{"base", "camera", make_pose({0.1, -0.2, 0.3}, {0.3, -0.8, 2})};
+  data::CameraIntrinsics lens = make_scene(protocol_settings(Setup::eye_to_hand), board_points(), 1).camera;
+  lens.cx += 1.0 / 3;
+  for (const std::string& text : {ros_static_transform(transform, lens), urdf_joint(transform, lens),
+                                  easy_handeye2(transform, Setup::eye_to_hand, lens)}) {
+    const auto read = data::find_lens_remark(text, "export");
+    ASSERT_TRUE(read) << text;
+    EXPECT_EQ(read->cx, lens.cx);
+    EXPECT_EQ(read->width, lens.width);
+  }
+  const data::TemporaryFolder folder;
+  const data::CameraPose pose = data::load_camera_pose(
+      folder.write("a.calib", easy_handeye2(transform, Setup::eye_to_hand, lens)), false);
+  EXPECT_LT((pose.transform.T.matrix() - transform.T.matrix()).norm(), 1e-7);  // nine digits
+  ASSERT_TRUE(pose.lens);
+  EXPECT_EQ(pose.lens->cx, lens.cx);
 }
 
 }  // namespace

@@ -60,9 +60,33 @@ TEST(ExtrinsicsJson, WhatItWasMadeFromIsSavedAndLoaded) {
   EXPECT_EQ(loaded.inputs.time_offset->estimate, 0.03);
   EXPECT_TRUE(loaded.pixels);
   EXPECT_EQ(loaded.use, Use::two_arms);
+  EXPECT_FALSE(loaded.size_unknown);
+  nlohmann::ordered_json unknown = json;
+  unknown["scale"]["prior_sd"] = nullptr;  // as --target-size solved writes it
+  unknown["scale"]["solved"] = true;
+  EXPECT_TRUE(load_extrinsics(folder.write("unknown.json", data::format_json(unknown))).size_unknown);
   EXPECT_EQ(loaded.inputs.robot, "arm.urdf");
   EXPECT_EQ(loaded.inputs.base_link, "base");
   EXPECT_EQ(loaded.inputs.tip_link, "tool");
+}
+
+TEST(ExtrinsicsJson, TheLensIsAsStatedOnlyWhereItIs) {
+  const HandEyeScene scene = make_scene(protocol_settings(Setup::eye_in_hand), board_points(), 1);
+  data::CameraIntrinsics stated = scene.camera;
+  stated.cx += 3;
+  for (const bool kept : {false, true}) {
+    CalibrateSettings settings;
+    settings.lens = kept ? LensKnowledge::stated : LensKnowledge::near;
+    const Calibration result = calibrate(Setup::eye_in_hand, stated, scene.points,
+                                         grid_symmetries(scene.points), scene.observations, settings);
+    const nlohmann::ordered_json json = to_json(result, {"recording", "", "", "", ""}, 0);
+    EXPECT_EQ(json["lens"]["as_stated"], kept);
+    EXPECT_EQ(json["lens"]["solved"], !kept);
+    const data::TemporaryFolder folder;
+    const Extrinsics loaded = load_extrinsics(folder.write("camera.json", data::format_json(json)), true);
+    EXPECT_EQ(loaded.stated_lens->cx, stated.cx);
+    EXPECT_EQ(loaded.lens->cx, result.refined.bundle.intrinsics.front().cx);
+  }
 }
 
 }  // namespace

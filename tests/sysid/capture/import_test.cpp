@@ -172,6 +172,36 @@ TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
   EXPECT_NE(std::find(said.begin(), said.end(), (folder_ / "camera.json") + ": one axis only"), said.end());
 }
 
+TEST_F(ImportFiles, AnotherLensThanThatOfTheExtrinsicsIsRefusedAndTheirsTravels) {
+  data::CameraIntrinsics camera;
+  camera.width = camera.height = 4;
+  camera.fx = camera.fy = 10;
+  camera.cx = camera.cy = 1.5;
+  data::save_camera_info(camera, folder_ / "camera.yaml");
+  data::save_depth_image({4, 4, std::vector<std::uint16_t>(16, 1000)}, folder_ / "depth/a.png");
+  folder_.write("camera.json",
+                R"({"schema": "flash-extrinsics/2", "transform": {"translation": [0.5, 0.24, 1.06],
+                    "rotation_xyzw": [1, 0, 0, 0]}, "lens": {"size_px": [4, 4], "focal_px": [12, 12],
+                    "centre_px": [1.5, 1.5], "distortion": []}})");
+  settings_.clouds.clear();
+  settings_.depth = {folder_ / "depth/a.png"};
+  settings_.intrinsics = folder_ / "camera.yaml";
+  settings_.extrinsics = folder_ / "camera.json";
+  const std::string said = data::input_error_of([&] { import_recording(settings_); });
+  for (const std::string& part : {settings_.intrinsics, settings_.extrinsics, std::string("fx 10.00"),
+                                  std::string("fx 12.00"), std::string("--lens solved")})
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+  const auto imported_focal = [&] { return import_recording(settings_).camera->intrinsics.fx; };
+  settings_.lens = data::LensChoice::solved;
+  EXPECT_EQ(imported_focal(), 12);
+  settings_.overwrite = true;
+  settings_.lens = data::LensChoice::stated;
+  EXPECT_EQ(imported_focal(), 10);
+  settings_.lens = data::LensChoice::agreeing;
+  settings_.intrinsics.clear();
+  EXPECT_EQ(imported_focal(), 12);
+}
+
 TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
   // Seen from above, from the grasped corner: 0.3 m to the left (+x), 0.2 m to the right (+y).
   data::Points cloud(31 * 21, 3);

@@ -118,6 +118,78 @@ TEST_F(SegmentFolder, CamerasThatCannotBeUsedAreRefusedUnlessAccepted) {
   EXPECT_EQ(segment_folder({accepted}, {0.0}, settings, folder("out")).warnings, said);
 }
 
+// The camera is seen with 160 px, and held to be one of 150 px, which puts the rim of the patch 7 mm off.
+TEST_F(SegmentFolder, AnotherLensThanThatOfTheExtrinsicsIsRefusedOrRightToAMillimetre) {
+  write_depth_view(folder("raw"), {0.1});
+  const auto calibrated = [&](double stated) {
+    std::ofstream(folder("raw") + "/extrinsics.json")
+        << R"({"schema": "flash-extrinsics/2", "transform": {"translation": [0.5, 0.1, 1.07],
+               "rotation_xyzw": [1, 0, 0, 0]}, "lens": {"size_px": [160, 120], "focal_px": [160, 160],
+               "centre_px": [79.5, 59.5], "distortion": [], "stated": {"focal_px": [)"
+        << stated << ", " << stated << R"(], "centre_px": [79.5, 59.5], "distortion": []}}})";
+  };
+  data::CameraIntrinsics other = small_camera();
+  other.fx = other.fy = 150;
+  data::save_camera_info(other, folder("raw") + "/camera_info.yaml");
+  calibrated(155);
+  EXPECT_EQ(
+      message_of([&] { open_raw_view(folder("raw")); }),
+      folder("raw") + "/camera_info.yaml: found fx 150.00, fy 150.00, cx 79.50, cy 59.50, but " +
+          folder("raw") +
+          "/extrinsics.json holds with fx 160.00, fy 160.00, cx 79.50, cy 59.50, up to 6.25 px from it: "
+          "expected one lens; --lens solved takes that of " +
+          folder("raw") + "/extrinsics.json, --lens stated the other");
+  const auto rim = [&](const RawViewFiles& given) {
+    std::size_t not_finite = 0;
+    const data::Points points = load_raw_frame(open_raw_view(folder("raw"), given), 0, true, not_finite);
+    double farthest = 0;
+    for (const auto& point : points.rowwise())
+      if (point.z() > 0.15) farthest = std::max(farthest, point.x() - camera_position.x());
+    return farthest;
+  };
+  // Of 160 px at 0.9 m, the outermost pixel within 0.1 m is 17.5 px from the axis.
+  const double right = 17.5 * 0.9 / 160;
+  RawViewFiles given;
+  given.lens = data::LensChoice::solved;
+  EXPECT_NEAR(rim(given), right, 1e-3);
+  given.lens = data::LensChoice::stated;
+  EXPECT_NEAR(rim(given), 17.5 * 0.9 / 150, 1e-3);
+  EXPECT_EQ(open_raw_view(folder("raw"), given).warnings.size(), 1u);
+  calibrated(150);  // the lens that the calibration began with
+  EXPECT_NEAR(rim({}), right, 1e-3);
+  EXPECT_EQ(open_raw_view(folder("raw")).warnings.size(), 1u);
+  fs::remove(folder("raw") + "/camera_info.yaml");
+  EXPECT_NEAR(rim({}), right, 1e-3);
+  EXPECT_TRUE(open_raw_view(folder("raw")).warnings.empty());
+}
+
+// Depth in metres as numpy writes it, a lens without the size of its pictures, and a bare 4 x 4 matrix.
+TEST_F(SegmentFolder, DepthLensAndPoseMayBeOfAllKindsThatFlashCalibReads) {
+  write_depth_view(folder("raw"), {0.1});
+  std::size_t not_finite = 0;
+  const data::Points expected = load_raw_frame(open_raw_view(folder("raw")), 0, true, not_finite);
+  const data::DepthImage counts = patch_above_table(0.1);
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (120, 160), }";
+  header.resize(117, ' ');
+  fs::create_directories(folder("other/depth"));
+  std::ofstream npy(folder("other/depth/0.npy"), std::ios::binary);
+  npy << std::string("\x93NUMPY\x01\x00\x76\x00", 10) << header << '\n';
+  for (const std::uint16_t count : counts.pixels) {
+    const float metres = 0.001F * static_cast<float>(count);
+    npy.write(reinterpret_cast<const char*>(&metres), sizeof metres);
+  }
+  npy.close();
+  std::ofstream(folder("other/lens.json"))
+      << R"({"mtx": [[160, 0, 79.5], [0, 160, 59.5], [0, 0, 1]], "dist": []})";
+  std::ofstream(folder("other/pose.txt")) << "1 0 0 0.5\n0 -1 0 0.1\n0 0 -1 1.07\n0 0 0 1\n";
+  RawViewFiles given;
+  given.intrinsics = folder("other/lens.json");
+  given.extrinsics = folder("other/pose.txt");
+  const data::Points points = load_raw_frame(open_raw_view(folder("other"), given), 0, true, not_finite);
+  ASSERT_EQ(points.rows(), expected.rows());
+  EXPECT_LT((points - expected).cwiseAbs().maxCoeff(), 1e-6);  // floats of a metre have 1e-7
+}
+
 TEST_F(SegmentFolder, ViewsAreMergedFrameByFrame) {
   write_depth_view(folder("a"), {0.1});
   fs::create_directories(folder("b"));

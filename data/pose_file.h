@@ -1,13 +1,10 @@
 #pragma once
 #include <Eigen/Geometry>
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "calib/geometry/serial_chain.h"
-
-namespace flash::calib {
+namespace flash::data {
 
 /// A pose of the robot as a file gives it.
 struct RecordedPose {
@@ -21,6 +18,7 @@ struct RecordedPose {
 struct PoseList {
   std::vector<RecordedPose> poses;
   bool in_order = false;  ///< without names or numbers: each belongs to the picture at its place
+  bool timed = false;     ///< stamps are times, as the file says [s]
   std::string guess;      ///< how numbers without a name were read; empty: all have one
 };
 
@@ -38,29 +36,22 @@ struct PosePair {
 /// as load_json_poses reads it; the robot's poses of `.samples`.
 PoseList load_pose_list(const std::string& path);
 
-/// A CSV of joints whose header names the columns: image, index or t as above, and each joint that moves by
-/// its name in the robot, or q1 q2 ... in their order [rad, m]; with the ending _deg in degrees. The pose is
-/// that of the robot's last link. Throws InputError naming file and line.
-PoseList load_joint_list(const std::string& path, const SerialChain& robot);
+/// Eight numbers a line parted by blanks, or a name that ends in .tum.
+bool is_tum(const std::string& path);
 
 /// One pose in YAML: x y z qx qy qz qw; position and orientation, or translation and rotation, of named
 /// parts; a 4 x 4 matrix as {rows, cols, data} or a list of lists; ViSP's vector of translation and axis
-/// times angle. The stamp is the last number in the file name. Throws InputError.
+/// times angle; also below `transform` or `pose`, as in easy_handeye2's calibrations. Throws InputError.
+Eigen::Isometry3d load_yaml_pose(const std::string& path);
+
+/// The same with the last number in the file name as its stamp.
 RecordedPose load_pose_yaml(const std::string& path);
 
 /// easy_handeye2 `.samples` (robot, tracking) or JSON: MoveIt's `pose_samples.json` (effector in the world,
 /// object in the sensor) and others (load_json_pairs). Throws InputError.
 std::vector<PosePair> load_pose_pairs(const std::string& path);
 
-/// How three numbers are a rotation. About fixed axes, "xyz" (roll, pitch, yaw; Fanuc's W P R) and the other
-/// eleven orders: R = R_c(angles[2]) R_b(angles[1]) R_a(angles[0]) for "abc". About axes that turn along, in
-/// capitals: R = R_a(angles[0]) R_b(angles[1]) R_c(angles[2]) for "ABC", as "ZYX" (KUKA's A B C), "XYZ"
-/// (Staubli) and "ZYZ" (Kawasaki's O A T). And "rotvec": axis times angle (Universal Robots).
-constexpr const char* kRotationVector = "rotvec";
-Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& angles, const std::string& order = "xyz");
-const std::vector<std::string>& angle_orders();
-
 /// The last whole number in a file name without its folder and ending: "frame_000012.png" is 12.
 std::optional<long> number_in_name(const std::string& path);
 
-}  // namespace flash::calib
+}  // namespace flash::data

@@ -1,14 +1,15 @@
-#include "calib/dataset/bare_poses.h"
+#include "data/bare_poses.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "calib/dataset/pose_numbers.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/pose_numbers.h"
+#include "data/rotation_angles.h"
 #include "data/text.h"
 
-namespace flash::calib {
+namespace flash::data {
 namespace {
 
 using Row = std::vector<double>;
@@ -18,23 +19,23 @@ constexpr double kTurn = 2 * M_PI + 1e-6;
 std::vector<Row> read_rows(const std::string& path) {
   const std::string text = read_text(path);
   std::vector<Row> rows;
-  data::LineReader lines(text);
+  LineReader lines(text);
   for (std::string_view line; lines.next(line);) {
-    const std::vector<std::string_view> words = data::split(line, " \t\r,;[]()");
+    const std::vector<std::string_view> words = split(line, " \t\r,;[]()");
     Row row;
     for (const std::string_view word : words) {
       if (word.empty()) continue;
       if (word.front() == '#') break;
-      const std::optional<double> value = data::parse_number(word);
+      const std::optional<double> value = parse_number(word);
       if (!value || !std::isfinite(*value))
-        throw data::input_error(path, "line " + std::to_string(lines.number()),
-                                "found \"" + std::string(word) +
-                                    "\", expected numbers alone, or a header that names the columns");
+        throw input_error(path, "line " + std::to_string(lines.number()),
+                          "found \"" + std::string(word) +
+                              "\", expected numbers alone, or a header that names the columns");
       row.push_back(*value);
     }
     if (!row.empty()) rows.push_back(std::move(row));
   }
-  if (rows.empty()) throw data::InputError(path + ": found no poses");
+  if (rows.empty()) throw InputError(path + ": found no poses");
   return rows;
 }
 
@@ -42,8 +43,8 @@ std::vector<Row> read_rows(const std::string& path) {
 std::vector<Row> joined(std::vector<Row> rows, const std::string& path) {
   if (rows.front().size() != 4) return rows;
   if (rows.size() % 4 != 0)
-    throw data::InputError(path + ": found " + std::to_string(rows.size()) +
-                           " lines of four numbers, expected four for each 4 x 4 matrix");
+    throw InputError(path + ": found " + std::to_string(rows.size()) +
+                     " lines of four numbers, expected four for each 4 x 4 matrix");
   std::vector<Row> whole;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i % 4 == 0) whole.emplace_back();
@@ -61,9 +62,14 @@ bool are_quaternions(const std::vector<Row>& rows, std::size_t first) {
 }
 
 /// Whether the first column numbers the rows.
-bool are_numbered(const std::vector<Row>& rows) {
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    if (rows[i][0] != std::floor(rows[i][0]) || (i > 0 && !(rows[i][0] > rows[i - 1][0]))) return false;
+bool are_whole(const std::vector<Row>& rows) {
+  return std::all_of(rows.begin(), rows.end(), [](const Row& row) { return row[0] == std::floor(row[0]); });
+}
+
+/// Whether the first column may be a number or a time.
+bool are_increasing(const std::vector<Row>& rows) {
+  for (std::size_t i = 1; i < rows.size(); ++i)
+    if (!(rows[i][0] > rows[i - 1][0])) return false;
   return rows.size() > 1;
 }
 
@@ -73,21 +79,23 @@ PoseList interpreted(const std::vector<Row>& rows, const std::vector<double>& st
   const std::size_t width = rows.front().size();
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (rows[i].size() != width)
-      throw data::input_error(path, "pose " + std::to_string(i + 1),
-                              "found " + std::to_string(rows[i].size()) + " numbers, expected " +
-                                  std::to_string(width) + " as in the first");
+      throw input_error(path, "pose " + std::to_string(i + 1),
+                        "found " + std::to_string(rows[i].size()) + " numbers, expected " +
+                            std::to_string(width) + " as in the first");
   const bool ambiguous = width == 7 && !are_quaternions(rows, 3);
-  const bool numbered =
-      stamps.empty() && (width == 8 || width == 13 || width == 17 || ambiguous) && are_numbered(rows);
+  const bool numbered = stamps.empty() &&
+                        (width == 8 || width == 13 || width == 17 || (ambiguous && are_whole(rows))) &&
+                        are_increasing(rows);
   const std::size_t first = numbered ? 1 : 0, numbers = width - first;
   if (numbers != 6 && numbers != 7 && numbers != 12 && numbers != 16)
-    throw data::input_error(
-        path, "pose 1",
-        "found " + std::to_string(width) +
-            " numbers, expected 6 (x y z and three angles), 7 (x y z qx qy qz qw), 12 or 16 (a "
-            "matrix), with or without the number of the picture before them");
+    throw input_error(path, "pose 1",
+                      "found " + std::to_string(width) +
+                          " numbers, expected 6 (x y z and three angles), 7 (x y z qx qy qz qw), 12 or 16 (a "
+                          "matrix), with or without the number of the picture before them");
   PoseList list;
   list.in_order = !numbered && stamps.empty();
+  constexpr double kLargestNumber = 1e8;  // no recording has as many pictures: it is a clock
+  list.timed = numbered && !(are_whole(rows) && rows.back()[0] < kLargestNumber);
   bool degrees = false;
   for (const Row& row : rows)
     for (std::size_t i = first + 3; numbers == 6 && i < row.size(); ++i) degrees |= std::abs(row[i]) > kTurn;
@@ -95,7 +103,7 @@ PoseList interpreted(const std::vector<Row>& rows, const std::vector<double>& st
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::string where = "pose " + std::to_string(i + 1);
     RecordedPose& pose = list.poses.emplace_back();
-    pose.stamp = numbered ? rows[i][0] : stamps.empty() ? static_cast<double>(i) : stamps[i];
+    pose.stamp = numbered ? seconds_of(rows[i][0]) : stamps.empty() ? static_cast<double>(i) : stamps[i];
     const Row row(rows[i].begin() + static_cast<std::ptrdiff_t>(first), rows[i].end());
     if (numbers == 6) {
       pose.angles = Eigen::Vector3d(row[3], row[4], row[5]) * (degrees ? M_PI / 180 : 1);
@@ -110,7 +118,10 @@ PoseList interpreted(const std::vector<Row>& rows, const std::vector<double>& st
   if (millimetres)
     for (RecordedPose& pose : list.poses) pose.pose.translation() *= 1e-3;
   const std::string unit = millimetres ? "mm" : "m";
-  list.guess = path + ": columns without names were read as " + (numbered ? "the picture's number, " : "") +
+  list.guess = path + ": columns without names were read as " +
+               (list.timed ? "a time, "
+                : numbered ? "the picture's number, "
+                           : "") +
                (numbers == 6 ? "x y z [" + unit + "], three angles [" + (degrees ? "deg" : "rad") +
                                    "] as --angles says (else about fixed x, y, z)"
                 : numbers == 7 ? "x y z [" + unit + "], quaternion x y z w"
@@ -132,12 +143,11 @@ PoseList load_bare_pose_files(const std::vector<std::string>& files, const std::
     Row row;  // a matrix may stand on three or four lines
     for (const Row& line : read_rows(file)) row.insert(row.end(), line.begin(), line.end());
     const std::optional<long> number = number_in_name(file);
-    if (!number)
-      throw data::InputError(file + ": found no number in the file name, expected that of its image");
+    if (!number) throw InputError(file + ": found no number in the file name, expected that of its image");
     rows.push_back(std::move(row));
     stamps.push_back(static_cast<double>(*number));
   }
   return interpreted(rows, stamps, folder);
 }
 
-}  // namespace flash::calib
+}  // namespace flash::data

@@ -1,13 +1,13 @@
-#include "calib/dataset/pose_json.h"
+#include "data/pose_json.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "calib/dataset/pose_numbers.h"
-#include "calib/geometry/pose.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/pose_numbers.h"
 
-namespace flash::calib {
+namespace flash::data {
 namespace {
 
 using Json = nlohmann::json;
@@ -23,7 +23,7 @@ const Json* find(const Json& object, Names names) {
 
 std::vector<double> flat(const Json& value, const std::string& path, const std::string& where) {
   if (value.is_number()) return {value.get<double>()};
-  if (!value.is_array()) throw data::input_error(path, where, "expected numbers");
+  if (!value.is_array()) throw input_error(path, where, "expected numbers");
   std::vector<double> numbers;
   for (const Json& item : value)
     for (const double number : flat(item, path, where)) numbers.push_back(number);
@@ -37,7 +37,7 @@ std::vector<double> parts(const Json& object, Names names, const std::string& pa
   for (const char* name : names) {
     const Json* part = find(object, {name});
     if (!part || !part->is_number())
-      throw data::input_error(path, where + '.' + name, "missing, expected a number");
+      throw input_error(path, where + '.' + name, "missing, expected a number");
     numbers.push_back(part->get<double>());
   }
   return numbers;
@@ -53,8 +53,7 @@ Eigen::Isometry3d pose_of_json(const Json& value, const std::string& path, const
     std::vector<double> numbers = parts(*place, {"x", "y", "z"}, path, where);
     const std::vector<double> rotation = parts(*turn, {"x", "y", "z", "w"}, path, where);
     if (numbers.size() != 3 || (rotation.size() != 4 && rotation.size() != 9))
-      throw data::input_error(path, where,
-                              "expected a place of 3 numbers and a rotation of 4 (x y z w) or 9");
+      throw input_error(path, where, "expected a place of 3 numbers and a rotation of 4 (x y z w) or 9");
     if (rotation.size() == 4) {
       numbers.insert(numbers.end(), rotation.begin(), rotation.end());
     } else {
@@ -70,15 +69,15 @@ Eigen::Isometry3d pose_of_json(const Json& value, const std::string& path, const
   }
   if (find(value, {"qw"}))
     return pose_of_numbers(parts(value, {"x", "y", "z", "qx", "qy", "qz", "qw"}, path, where), path, where);
-  throw data::input_error(path, where,
-                          "expected a pose: a 4 x 4 matrix, position and orientation, or x y z qx qy qz qw");
+  throw input_error(path, where,
+                    "expected a pose: a 4 x 4 matrix, position and orientation, or x y z qx qy qz qw");
 }
 
 Json list_in(const std::string& path) {
-  const Json file = data::load_json(path);
+  const Json file = load_json(path);
   const Json* list = file.is_array() ? &file : find(file, {"poses", "samples", "data", "frames"});
   if (!list || !list->is_array() || list->empty())
-    throw data::InputError(path + ": expected a list of poses, or one below poses, samples, data or frames");
+    throw InputError(path + ": expected a list of poses, or one below poses, samples, data or frames");
   return *list;
 }
 
@@ -95,18 +94,22 @@ PoseList load_json_poses(const std::string& path) {
     pose.pose = pose_of_json(items[i], path, where);
     distances.push_back(pose.pose.translation().stableNorm());
     const Json* name = find(items[i], {"image", "file", "filename", "name"});
-    const Json* number = find(items[i], {"index", "id", "frame", "t", "timestamp"});
+    const Json* number = find(items[i], {"index", "id", "frame", "t", "timestamp", "time", "stamp"});
     if (name && name->is_string())
       pose.image = name->get<std::string>();
     else if (number && number->is_number())
-      pose.stamp = number->get<double>();
+      pose.stamp = seconds_of(number->get<double>());
     else
       pose.stamp = static_cast<double>(in_order++);
   }
   if (in_order > 0 && in_order < items.size())
-    throw data::InputError(path + ": " + std::to_string(in_order) +
-                           " poses have neither name nor number of a picture, others have");
+    throw InputError(path + ": " + std::to_string(in_order) +
+                     " poses have neither name nor number of a picture, others have");
   list.in_order = in_order > 0;
+  list.timed = std::all_of(items.begin(), items.end(), [](const Json& item) {
+    return find(item, {"t", "timestamp", "time", "stamp"}) &&
+           !find(item, {"image", "file", "filename", "name", "index", "id", "frame"});
+  });
   if (list.in_order) list.guess = path + ": poses without names or numbers are in the order of the pictures";
   expect_metres(distances, path);
   return list;
@@ -125,13 +128,12 @@ std::vector<PosePair> load_json_pairs(const std::string& path) {
                              : find(item, {"tracking", "target", "object", "board", "marker",
                                            "T_camera_target", "target_pose"});
     if (!first || !second)
-      throw data::input_error(
-          path, where,
-          "expected two poses: of the gripper in the world (robot) and of the target in the "
-          "camera (target)");
+      throw input_error(path, where,
+                        "expected two poses: of the gripper in the world (robot) and of the target in the "
+                        "camera (target)");
     pairs.push_back({pose_of_json(*first, path, where), pose_of_json(*second, path, where)});
   }
   return pairs;
 }
 
-}  // namespace flash::calib
+}  // namespace flash::data

@@ -1,16 +1,16 @@
-#include "calib/dataset/npz.h"
+#include "data/npz.h"
 
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string_view>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/text.h"
 
-namespace flash::calib {
+namespace flash::data {
 namespace {
-
-using data::InputError;
 
 /// A number of the ZIP format, little endian; throws beyond the end of the file.
 template <class Number>
@@ -36,8 +36,23 @@ std::vector<double> converted(std::string_view bytes) {
   return {numbers.begin(), numbers.end()};
 }
 
-/// None of an array that is no list of real numbers.
-std::vector<double> array_of(std::string_view npy) {
+/// "(480, 640)"
+std::vector<std::size_t> shape_of(std::string_view text) {
+  std::vector<std::size_t> shape;
+  for (const std::string_view word : split(text, " ,"))
+    if (const std::optional<long> size = parse_integer(word); size && *size >= 0)
+      shape.push_back(static_cast<std::size_t>(*size));
+  return shape;
+}
+
+std::size_t count_of(const std::vector<std::size_t>& shape) {
+  std::size_t count = 1;
+  for (const std::size_t size : shape) count *= size;
+  return count;
+}
+
+/// Empty of an array that is no list of real numbers.
+NumpyArray array_of(std::string_view npy) {
   if (!npy.starts_with("\x93NUMPY") || npy.size() < 12) return {};
   const bool first_version = npy[6] == 1;
   const std::size_t begin = first_version ? 10 : 12;
@@ -48,22 +63,29 @@ std::vector<double> array_of(std::string_view npy) {
   if (!first_version) length += 65536 * byte(10);
   if (begin + length > npy.size()) return {};
   const std::string_view header = npy.substr(begin, length), bytes = npy.substr(begin + length);
-  const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
   const std::string_view type = value_of(header, "'descr': '", "'");
-  std::vector<double> values;
+  NumpyArray array{.shape = shape_of(value_of(header, "'shape': (", ")")), .values = {}};
+  std::vector<double>& values = array.values;
   if (type == "<f8") values = converted<double>(bytes);
   if (type == "<f4") values = converted<float>(bytes);
   if (type == "<i8") values = converted<std::int64_t>(bytes);
   if (type == "<i4") values = converted<std::int32_t>(bytes);
-  if (columns_first && values.size() == 9)
-    for (const std::size_t i : {1U, 2U, 5U}) std::swap(values[i], values[3 * (i % 3) + i / 3]);
-  return values;
+  if (type == "<u4") values = converted<std::uint32_t>(bytes);
+  if (type == "<u2") values = converted<std::uint16_t>(bytes);
+  array.whole = !type.empty() && type.size() == 3 && type[1] != 'f';
+  const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
+  if (columns_first && array.shape.size() == 2 && values.size() == count_of(array.shape)) {
+    const std::size_t rows = array.shape[0], columns = array.shape[1];
+    const std::vector<double> stored = values;
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = stored[(i % columns) * rows + i / columns];
+  }
+  return array;
 }
 
 }  // namespace
 
 std::map<std::string, std::vector<double>> load_npz(const std::string& path) {
-  const std::string file = data::read_file(path);
+  const std::string file = read_file(path);
   const std::size_t end = file.rfind("PK\x05\x06");
   if (end == std::string::npos) throw InputError(path + ": no .npz: found no table of contents");
   std::map<std::string, std::vector<double>> arrays;
@@ -85,10 +107,17 @@ std::map<std::string, std::vector<double>> load_npz(const std::string& path) {
     const std::size_t begin =
         local + 30 + at<std::uint16_t>(file, local + 26, path) + at<std::uint16_t>(file, local + 28, path);
     if (begin + size > file.size()) throw InputError(path + ": " + name + ": ends within its data");
-    arrays[name] = array_of(std::string_view(file).substr(begin, size));
+    arrays[name] = array_of(std::string_view(file).substr(begin, size)).values;
     entry += 46U + name_length + extra + comment;
   }
   return arrays;
 }
 
-}  // namespace flash::calib
+NumpyArray load_npy(const std::string& path) {
+  NumpyArray array = array_of(read_file(path));
+  if (array.values.empty() || array.values.size() != count_of(array.shape))
+    throw InputError(path + ": found no array of real numbers, expected what numpy.save writes of one");
+  return array;
+}
+
+}  // namespace flash::data

@@ -1,17 +1,17 @@
-#include "calib/dataset/pose_numbers.h"
+#include "data/pose_numbers.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string_view>
 
-#include "calib/geometry/pose.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/median.h"
+#include "data/rotation_angles.h"
 #include "data/text.h"
 #include "data/trajectory.h"
 
-namespace flash::calib {
+namespace flash::data {
 namespace {
 
 constexpr double kReach = 10;  // [m]
@@ -21,12 +21,11 @@ constexpr double kReach = 10;  // [m]
 Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vector4d& xyzw,
                           const std::string& path, const std::string& where) {
   if (std::abs(xyzw.norm() - 1) > 1e-3)
-    throw data::input_error(
-        path, where,
-        "quaternion has length " + data::format_short(xyzw.norm()) + ", expected 1 (order x y z w)");
+    throw input_error(path, where,
+                      "quaternion has length " + format_short(xyzw.norm()) + ", expected 1 (order x y z w)");
   Eigen::Matrix<double, 7, 1> row;
   row << translation, xyzw;
-  return data::from_vector(row);
+  return from_vector(row);
 }
 
 Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path, const std::string& where) {
@@ -34,7 +33,7 @@ Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path
   const double off = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm();
   if (!(off < 1e-3) || rotation.determinant() < 0 ||
       (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6)
-    throw data::input_error(path, where, "expected a rotation and a translation as 4 x 4, last row 0 0 0 1");
+    throw input_error(path, where, "expected a rotation and a translation as 4 x 4, last row 0 0 0 1");
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
   pose.translation() = matrix.topRightCorner<3, 1>();
@@ -55,37 +54,43 @@ Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::
                    where);
   if (values.size() == 6) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = rotation_exp({values[3], values[4], values[5]});
+    pose.linear() = rotation_from_vector({values[3], values[4], values[5]});
     pose.translation() << values[0], values[1], values[2];
     return pose;
   }
-  throw data::input_error(path, where,
-                          "found " + std::to_string(values.size()) +
-                              " numbers, expected a pose: 16 or 12 (matrix), 7 (x y z qx qy qz qw) or 6 (x y "
-                              "z and axis times angle)");
+  throw input_error(path, where,
+                    "found " + std::to_string(values.size()) +
+                        " numbers, expected a pose: 16 or 12 (matrix), 7 (x y z qx qy qz qw) or 6 (x y "
+                        "z and axis times angle)");
 }
+
+std::string trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r\"#"), end = text.find_last_not_of(" \t\r\"");
+  return begin == std::string_view::npos ? std::string() : std::string(text.substr(begin, end + 1 - begin));
+}
+
+double seconds_of(double stamp) { return std::abs(stamp) > 1e14 ? stamp * 1e-9 : stamp; }
 
 std::string read_text(const std::string& path) {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
-  std::string text = data::read_file(path);
+  std::string text = read_file(path);
   if (text.starts_with(kMark)) text.erase(0, kMark.size());
   if (const std::size_t zero = text.find('\0'); zero != std::string::npos)
-    throw data::InputError(path + ": found a byte 0, expected text, at byte " + std::to_string(zero));
+    throw InputError(path + ": found a byte 0, expected text, at byte " + std::to_string(zero));
   // Lines of old end in a carriage return alone.
   if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');
   return text;
 }
 
 bool beyond_reach(std::vector<double> distances) {
-  return !distances.empty() && data::median(std::move(distances)) > kReach;
+  return !distances.empty() && median(std::move(distances)) > kReach;
 }
 
 void expect_metres(const std::vector<double>& distances, const std::string& path) {
   if (beyond_reach(distances))
-    throw data::input_error(
-        path, "translations",
-        "half of them are beyond " + data::format_short(data::median(distances)) +
-            " m, expected metres (are these millimetres? name the columns x_mm, y_mm, z_mm)");
+    throw input_error(path, "translations",
+                      "half of them are beyond " + format_short(median(distances)) +
+                          " m, expected metres (are these millimetres? name the columns x_mm, y_mm, z_mm)");
 }
 
-}  // namespace flash::calib
+}  // namespace flash::data

@@ -1,4 +1,4 @@
-#include "calib/dataset/yaml_file.h"
+#include "data/yaml_file.h"
 
 #include <cmath>
 #include <optional>
@@ -7,23 +7,22 @@
 #include "data/error.h"
 #include "data/text.h"
 
-namespace flash::calib {
+namespace flash::data {
 
 YAML::Node load_yaml(const std::string& path) {
-  std::string text = data::read_file(path);
+  std::string text = read_file(path);
   if (text.starts_with("%YAML:")) text.erase(0, text.find('\n'));  // OpenCV's own first line is no YAML
   try {
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw data::InputError(path + ": not valid YAML: line " + std::to_string(error.mark.line + 1));
+    throw InputError(path + ": not valid YAML: line " + std::to_string(error.mark.line + 1));
   }
 }
 
 double yaml_number(const YAML::Node& node, const std::string& path, const std::string& field) {
   const std::optional<double> value =
-      node.IsDefined() && node.IsScalar() ? data::parse_number(node.Scalar()) : std::nullopt;
-  if (!value || !std::isfinite(*value))
-    throw data::input_error(path, field, "missing, expected a finite number");
+      node.IsDefined() && node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
+  if (!value || !std::isfinite(*value)) throw input_error(path, field, "missing, expected a finite number");
   return *value;
 }
 
@@ -32,7 +31,7 @@ namespace {
 void add_numbers(const YAML::Node& node, const std::string& path, const std::string& field, int depth,
                  std::vector<double>& values) {
   constexpr int kDeepest = 8;  // an alias may hold itself
-  if (depth > kDeepest) throw data::input_error(path, field, "lists within lists, expected numbers");
+  if (depth > kDeepest) throw input_error(path, field, "lists within lists, expected numbers");
   if (node.IsScalar()) {
     values.push_back(yaml_number(node, path, field));
     return;
@@ -48,4 +47,4 @@ std::vector<double> yaml_numbers(const YAML::Node& node, const std::string& path
   return values;
 }
 
-}  // namespace flash::calib
+}  // namespace flash::data

@@ -1,0 +1,24 @@
+#pragma once
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace flash::data {
+
+/// An array of real numbers as numpy writes it, row by row; empty of other things.
+struct NumpyArray {
+  std::vector<std::size_t> shape;
+  std::vector<double> values;
+  bool whole = false;  ///< of integers
+};
+
+/// The arrays of real numbers of an .npz as numpy.savez writes it (not compressed), row by row, by name.
+/// Throws InputError.
+std::map<std::string, std::vector<double>> load_npz(const std::string& path);
+
+/// One array, as numpy.save writes it. Throws InputError where the file holds none of real numbers, or not as
+/// many as its shape says.
+NumpyArray load_npy(const std::string& path);
+
+}  // namespace flash::data
