@@ -240,6 +240,17 @@ void warn_of_shapes(Calibration& result, bool disputed, const CalibrateSettings&
   tell_first(result, size_sentence(*result.size), disputed && !settings.size_as_stated);
 }
 
+/// How the camera moves, right perturbation, where the lens is kept as it is stated and noise is estimated
+/// anew.
+Vector6d shift_with_stated_lens(const Calibration& result, Bundle plain, RefineSettings refine_settings,
+                                const data::CameraIntrinsics& camera) {
+  refine_settings.bundle.unknowns.intrinsics = 0;
+  plain.priors.lenses.clear();
+  plain.intrinsics = {camera};
+  const Refinement refined = refine(std::move(plain), refine_settings);
+  return motion_between(result.poses.X, refined.bundle.cameras.front());
+}
+
 /// A lens that is stated to the last digit, against one that is near to it: pictures that want another one
 /// say so, and an answer that depends on it is none.
 void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_settings,
@@ -431,8 +442,6 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   }
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
   result.lens.stated = to_vector(camera);
-  result.lens.camera_shift =
-      camera_shift(bundle, result.unknowns, result.refined.covariance, result.lens.stated);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
   result.edges = edge_estimate(bundle, result.unknowns, result.shared_covariance);
   if (settings.lens != given.lens)
@@ -450,6 +459,8 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
             .topLeftCorner<6, 6>();
     result.weakest = weakest_direction(result.covariance, usual_distance(observations), "camera");
   }
+  if (settings.lens != LensKnowledge::stated)
+    result.lens.camera_shift = shift_with_stated_lens(result, plain, refine_settings, camera);
   if (given.lens == LensKnowledge::stated)
     check_stated_lens(result, std::move(plain), refine_settings, camera, settings.lens_covariance);
   warn_of_shapes(result, sized.disputed, settings);

@@ -49,17 +49,6 @@ const char* lens_unknown(int i) {
   return kNames[i];
 }
 
-Vector6d camera_shift(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
-                      const IntrinsicsVector& stated) {
-  const SharedColumns columns = shared_columns(bundle, unknowns);
-  const int lens = columns.intrinsics.front(), count = columns.intrinsics_count,
-            camera = columns.cameras.front();
-  if (lens < 0) return Vector6d::Zero();
-  const Eigen::VectorXd off = (stated - to_vector(bundle.intrinsics.front())).head(count);
-  return covariance.block(camera, lens, 6, count) *
-         covariance.block(lens, lens, count, count).ldlt().solve(off);
-}
-
 bool exceeds_deviations(const Eigen::Isometry3d& X, const Vector6d& motion, const Matrix6d& covariance) {
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = X.linear();

@@ -19,17 +19,11 @@ enum class LensKnowledge {
 struct LensEstimate {
   IntrinsicsVector stated = IntrinsicsVector::Zero(), estimate = stated, sd = stated;
   std::vector<int> far_off;  ///< unknowns that are not what was stated, by three deviations of both together
-  Vector6d camera_shift = Vector6d::Zero();  ///< of the camera, were the lens as stated, see camera_shift()
+  Vector6d camera_shift = Vector6d::Zero();  ///< of the camera, were the lens as stated; (dt, dtheta)
 };
 
 /// fx, fy, cx, cy, k1, k2, p1, p2, k3.
 const char* lens_unknown(int i);
-
-/// How the camera moves, right perturbation (dt, dtheta), where the lens is `stated` to the last digit: of
-/// normal errors the mean of the camera given the lens, C_XL C_LL^-1 (stated - estimate). It does not depend
-/// on what was known of the lens. covariance: of all shared unknowns; zero where the lens is none of them.
-Vector6d camera_shift(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
-                      const IntrinsicsVector& stated);
 
 /// Whether a motion of the camera at X exceeds its deviation along or about an axis of its parent.
 bool exceeds_deviations(const Eigen::Isometry3d& X, const Vector6d& motion, const Matrix6d& covariance);

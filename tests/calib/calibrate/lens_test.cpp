@@ -87,7 +87,7 @@ TEST_P(Lens, FocalLengthFivePercentOffIsFoundAndSaid) {
   EXPECT_LT(found.centre_rms, 1.2 * found.chain_rms);  // and what the pose adds by its own noise
 }
 
-// The lens as stated, by the covariance of the answer and by an answer for that lens.
+// What the answer says of the stated lens, and an answer for that lens by itself.
 TEST_P(Lens, HowFarOffTheStatedLensWouldPutTheCameraIsWhatARefitSays) {
   const HandEyeScene scene = scene_of(GetParam(), 36);
   data::CameraIntrinsics stated = scene.camera;
@@ -100,9 +100,9 @@ TEST_P(Lens, HowFarOffTheStatedLensWouldPutTheCameraIsWhatARefitSays) {
   const Calibration kept = calibrated(scene, stated, settings);
   const Vector6d refit = motion_between(found.poses.X, kept.poses.X);
   EXPECT_GT(refit.head<3>().norm(), 5e-4);
-  // The refit weighs corners and robot anew; what is seen is how far, to a quarter.
-  EXPECT_LT((found.lens.camera_shift - refit).head<3>().norm(), 0.25 * refit.head<3>().norm());
-  EXPECT_LT((found.lens.camera_shift - refit).tail<3>().norm(), 0.25 * refit.tail<3>().norm());
+  // The other answer starts at a seed of its own; both end where steps no longer count.
+  EXPECT_LT((found.lens.camera_shift - refit).head<3>().norm(), 0.02 * refit.head<3>().norm());
+  EXPECT_LT((found.lens.camera_shift - refit).tail<3>().norm(), 0.02 * refit.tail<3>().norm());
   EXPECT_EQ(kept.lens.camera_shift.norm(), 0);
 }
 
