@@ -34,6 +34,8 @@ struct RunOptions {
   std::string scene, out, device = "auto";
   int threads = 0, steps = -1;
   std::optional<double> duration;  // [s]
+  int environments = 1;
+  std::string vary;
   bool contacts = false, quiet = false, verbose = false, json = false, force = false;
 };
 
@@ -101,6 +103,10 @@ void print_json(const sim::SceneSummary& summary, const std::string& out, int ex
     json["layer_distance_min_m"] = summary.layer_distance_min;
     json["layer_touches_max"] = summary.layer_touches_max;
   }
+  if (summary.environments > 1) {
+    json["environments"] = summary.environments;
+    json["unusable_environments"] = summary.unusable_environments;
+  }
   std::cout << data::format_json(json);
 }
 
@@ -138,10 +144,15 @@ int run(const RunOptions& options) {
   const auto begin = [&](const std::string& what) {
     if (!options.quiet) phase.emplace(what + " ...");
   };
+  sim::SceneRun settings;
+  settings.environments = options.environments;
+  if (!options.vary.empty()) settings.variations = sim::parse_variations(options.vary, "--vary");
+  if (!settings.variations.empty() && settings.environments < 2)
+    throw data::InputError(
+        "--vary: found one environment, expected --envs of 2 or more: the first is the scene itself");
   begin("reading " + options.scene);
   const data::Scene scene = data::load_scene(options.scene);
   ProgressLine progress(!options.quiet);
-  sim::SceneRun settings;
   settings.steps = steps_to_run(options, scene);
   settings.contacts = options.contacts;
   settings.threads =
@@ -166,8 +177,8 @@ int run(const RunOptions& options) {
         options.out);
   const double unconverged_share = double(summary.unconverged_steps) / std::max(1, summary.steps);
   const bool moves = !summary.at_rest.value_or(true);
-  const bool unusable =
-      !sim::accepted(unconverged_share, summary.residual_max) || moves || summary.collapsed_elements > 0;
+  const bool unusable = !sim::accepted(unconverged_share, summary.residual_max) || moves ||
+                        summary.collapsed_elements > 0 || summary.unusable_environments > 0;
   const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
   if (moves && !summary.interrupted)
     std::cerr << "flash-sim: warning: not at rest after " << summary.steps << " steps: "
@@ -185,6 +196,11 @@ int run(const RunOptions& options) {
               << " m; where both are small, energy came from nothing"
               << (summary.self_contact ? ", or layers kept what a hold carries from its place" : "")
               << " (accepted: 1 in 100, and 1; see " << (fs::path(options.out) / "log.csv").string() << ")\n";
+  const std::string environments = (fs::path(options.out) / "environments.csv").string();
+  if (summary.unusable_environments > 0)
+    std::cerr << "flash-sim: warning: " << summary.unusable_environments << " of " << summary.environments
+              << " environments are not to be used (" << environments << "); the first is "
+              << summary.first_unusable << '\n';
   if (options.json) {
     print_json(summary, options.out, exit_code);
   } else if (!options.quiet) {
@@ -200,8 +216,13 @@ int run(const RunOptions& options) {
     if (summary.layer_touches_max > 0)
       std::printf("layers touched at up to %d places, no nearer than %s m\n", summary.layer_touches_max,
                   data::format_short(summary.layer_distance_min).c_str());
-    std::printf("%s: %d frames, log.csv, forces.csv%s\n", options.out.c_str(), summary.frames,
-                options.contacts ? ", contacts, resultants.csv" : "");
+    if (summary.environments > 1)
+      std::printf("%d environments, %.3g ms a step and environment; those above are of environment 0\n",
+                  summary.environments,
+                  1e3 * summary.wall_seconds / std::max(1, summary.steps) / summary.environments);
+    std::printf("%s: %d frames, log.csv, forces.csv%s%s\n", options.out.c_str(), summary.frames,
+                options.contacts ? ", contacts, resultants.csv" : "",
+                summary.environments > 1 ? ", environments.csv" : "");
   }
   return exit_code;
 }
@@ -215,13 +236,24 @@ void add_run_verb(CLI::App& app, Action& action) {
       "Up to 1 % of the steps may end above the tolerance, none out of balance by more than the weight (a\n"
       "residual of 1), and no tetrahedron below a thousandth of its rest volume: else the exit code is 3.\n"
       "A scene that names neither steps nor duration runs 100 steps.\n"
-      "Example:\n  flash-sim run scene.json -o out");
+      "Examples:\n"
+      "  flash-sim run scene.json -o out\n"
+      "  flash-sim run scene.json -o out --envs 64 --vary bending=0.5:2:log,friction=0.2:0.8");
   verb.add_option("scene", options->scene, "Scene file (.json)")->required();
   verb.add_option("-o,--out", options->out, "Folder to write")->required();
   verb.add_option("--device", options->device, "Where the simulation runs")
       ->check(cpu_alone("scenes run on the CPU alone"))
       ->capture_default_str();
-  verb.add_option("--threads", options->threads, "Objects that step at the same time; 0: one a processor")
+  verb.add_option("--envs", options->environments,
+                  "Environments of the scene, side by side; frames and tables are those of the first")
+      ->check(whole_number(1, 100'000))
+      ->capture_default_str();
+  verb.add_option(
+      "--vary", options->vary,
+      "By which the others differ from the scene: factors on young, bending, density or friction, "
+      "as bending=0.5:2:log,friction=0.2:0.8");
+  verb.add_option("--threads", options->threads,
+                  "Objects, or environments of each, that step at the same time; 0: one a processor")
       ->check(thread_number())
       ->capture_default_str();
   verb.add_option("--steps", options->steps, "In place of the scene's")

@@ -13,7 +13,9 @@
 #include "sim/cuda/projective_phases.h"
 #include "sim/device_batch.h"
 #include "sim/device_error.h"
+#include "sim/environment_checks.h"
 #include "sim/step/resultants.h"
+#include "sim/worlds.h"
 #include "sim/zeroed_numbers.h"
 
 namespace flash::sim {
@@ -33,13 +35,13 @@ void copy_wrenches(const std::vector<Wrench>& wrenches, double* to) {
 
 struct Batch::Storage {
   std::shared_ptr<const SheetPlan> plan;
-  std::vector<Environment> environments;
   BatchSettings settings;
-  std::vector<std::optional<Solver>> solvers;                       ///< of environments under way
-  std::vector<std::optional<ProjectiveSolver>> projective_solvers;  ///< likewise
+  std::optional<Worlds> worlds;               ///< on the processor
+  std::vector<Environment> environments;      ///< on a device
+  std::vector<double> positions, velocities;  ///< likewise
   int step = 0;
-  std::ptrdiff_t vertices = 0, holds = 0, bodies = 0, obstacles = 0;
-  std::vector<double> positions, velocities, hold_forces;
+  std::ptrdiff_t count = 0, vertices = 0, holds = 0, bodies = 0, obstacles = 0;
+  std::vector<double> hold_forces;
   ZeroedNumbers kept;
   std::vector<StepStats> stats;
   std::vector<std::vector<ContactForce>> contacts;
@@ -48,6 +50,10 @@ struct Batch::Storage {
   std::mutex of_ticks;
 
   std::ptrdiff_t steps() const { return settings.steps - settings.first_step; }
+
+  const State& state(int e) const {
+    return worlds ? worlds->environment(e).state : environments[static_cast<std::size_t>(e)].state;
+  }
 
   double* kept_at(std::ptrdiff_t e, std::ptrdiff_t index) {
     return kept.data() + (e * static_cast<std::ptrdiff_t>(settings.kept_steps.size()) + index) * 3 * vertices;
@@ -58,21 +64,20 @@ struct Batch::Storage {
     const auto& wanted = settings.kept_steps;
     const auto found = std::lower_bound(wanted.begin(), wanted.end(), at);
     if (found == wanted.end() || *found != at) return;
-    const Points& x = environments[e].state.positions;
+    const Points& x = state(e).positions;
     std::copy(x.data(), x.data() + x.size(), kept_at(e, found - wanted.begin()));
   }
 
-  /// Copies the state of environment e to where all are side by side.
+  /// Copies the state of environment e of a device to where all are side by side.
   void show(int e) {
-    const State& state = environments[e].state;
-    std::copy(state.positions.data(), state.positions.data() + 3 * vertices,
-              positions.data() + e * 3 * vertices);
-    std::copy(state.velocities.data(), state.velocities.data() + 3 * vertices,
+    const State& at = state(e);
+    std::copy(at.positions.data(), at.positions.data() + 3 * vertices, positions.data() + e * 3 * vertices);
+    std::copy(at.velocities.data(), at.velocities.data() + 3 * vertices,
               velocities.data() + e * 3 * vertices);
   }
 
   /// Takes the next steps of all environments on the device.
-  void advance_on_device(int before, int count, const std::function<void(int)>& finished) {
+  void advance_on_device(int before, int steps_further, const std::function<void(int)>& finished) {
     DeviceResults results;
     results.stepped = [&](const DeviceSteps& taken) {
       const std::ptrdiff_t place = taken.environment * steps() + taken.first - settings.first_step;
@@ -89,24 +94,12 @@ struct Batch::Storage {
       show(e);
       if (finished) finished(e);
     };
-    sim::advance_on_device(plan, environments, settings, before, count, results);
+    sim::advance_on_device(plan, environments, settings, before, steps_further, results);
   }
 
-  StepReport newton_step(int e, int before) {
-    std::optional<Solver>& solver = solvers[e];
-    if (!solver) solver.emplace(plan, settings.solver);
-    if (before % restart_interval == 0) solver->forget();
-    return solver->step(environments[e]);
-  }
-
-  StepReport projective_step(int e) {
-    std::optional<ProjectiveSolver>& solver = projective_solvers[e];
-    if (!solver) solver.emplace(plan, *settings.projective);
-    return solver->step(environments[e]);
-  }
-
-  void take_step(int e, int before) {
-    const StepReport report = settings.projective ? projective_step(e) : newton_step(e, before);
+  /// Keeps what the step from `before` was like.
+  void take(int e, int before) {
+    const StepReport& report = worlds->report(e);
     const std::ptrdiff_t place = e * steps() + before - settings.first_step;
     stats[place] = {report.residual,       report.penetration_max, report.iterations, report.solves,
                     report.factorizations, report.substeps,        report.converged};
@@ -118,35 +111,31 @@ struct Batch::Storage {
 
   /// Keeps the contacts of the last step of environment e, and their sums.
   void keep_contacts(int e) {
-    const Environment& environment = environments[e];
-    contacts[e] =
-        solvers[e] ? solvers[e]->contacts(environment) : projective_solvers[e]->contacts(environment);
+    contacts[e] = worlds->contacts(e);
     const Resultants sums =
         resultants_of(contacts[e], static_cast<std::size_t>(bodies), static_cast<std::size_t>(obstacles));
     copy_wrenches(sums.bodies, body_resultants.data() + 6 * e * bodies);
     copy_wrenches(sums.obstacles, obstacle_resultants.data() + 6 * e * obstacles);
   }
+
+  /// Takes the next steps of all environments on the processor, of each to the end before another begins on
+  /// its thread: its numbers stay near.
+  void advance_on_processor(int before, int steps_further, const std::function<void(int)>& finished) {
+    const int end = before + steps_further;
+    std::vector<int> at(static_cast<std::size_t>(count), before);  // the step at which each stands
+    worlds->step(
+        steps_further, [&](int e) { take(e, at[static_cast<std::size_t>(e)]++); },
+        [&](int e) {
+          if (settings.contacts && steps_further > 0) keep_contacts(e);
+          if (end == settings.steps) worlds->drop_solver(e);
+          if (finished) finished(e);
+        });
+  }
 };
 
 namespace {
 
-bool frames_exist(const Environment& environment) {
-  const int frames = environment.schedule ? static_cast<int>(environment.schedule->frames.size()) : 0;
-  const auto exists = [&](int frame) { return frame >= base_frame && frame < frames; };
-  return std::all_of(environment.holds.begin(), environment.holds.end(),
-                     [&](const Hold& hold) { return exists(hold.frame); }) &&
-         std::all_of(environment.obstacles.begin(), environment.obstacles.end(),
-                     [&](const Obstacle& obstacle) { return exists(obstacle.frame); });
-}
-
-bool solids_match(const SheetPlan& plan, const Environment& environment) {
-  for (std::size_t b = 0; b < plan.bodies.size(); ++b)
-    if (plan.bodies[b].body.is_solid() != (environment.solids.count(static_cast<int>(b)) > 0)) return false;
-  return true;
-}
-
-void check(const SheetPlan& plan, const std::vector<Environment>& environments,
-           const BatchSettings& settings) {
+void check(const BatchSettings& settings) {
   const auto require = [](bool met, const char* what) {
     if (!met) throw std::invalid_argument(what);
   };
@@ -157,22 +146,6 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
           "batch: kept_steps have to ascend");
   require(kept.empty() || (kept.front() >= settings.first_step && kept.back() <= settings.steps),
           "batch: kept_steps have to lie between first_step and steps");
-  for (const Environment& environment : environments) {
-    require(environment.state.positions.rows() == plan.pattern.size &&
-                environment.state.velocities.rows() == plan.pattern.size,
-            "batch: every environment needs a position and a velocity for each vertex of the plan");
-    require(environment.state.bristles.rows() == 0 ||
-                environment.state.bristles.rows() ==
-                    plan.pattern.size * static_cast<Eigen::Index>(environment.obstacles.size()),
-            "batch: an environment needs bristles for each vertex on each obstacle, or none");
-    require(environment.holds.size() == environments.front().holds.size(),
-            "batch: all environments need the same number of holds");
-    require(solids_match(plan, environment),
-            "batch: every environment needs a solid material for each body of tetrahedra, and for no other");
-    for (const Hold& hold : environment.holds) check_stiffness(hold);
-    require(frames_exist(environment),
-            "batch: a hold or an obstacle names a frame that the schedule does not have");
-  }
 }
 
 /// A view of densely stored numbers, the last index fastest.
@@ -189,40 +162,45 @@ View<double> dense(const double* numbers, std::vector<std::ptrdiff_t> shape) {
 Batch::Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments,
              BatchSettings settings)
     : storage_(std::make_unique<Storage>()) {
-  check(*plan, environments, settings);
+  check(settings);
   Storage& s = *storage_;
   s.plan = std::move(plan);
-  s.environments = std::move(environments);
   s.settings = std::move(settings);
   s.step = s.settings.first_step;
+  s.count = std::ssize(environments);
   s.vertices = s.plan->pattern.size;
-  const std::size_t count = s.environments.size(), numbers = count * 3 * s.vertices;
-  s.holds = count > 0 ? static_cast<std::ptrdiff_t>(s.environments.front().holds.size()) : 0;
-  s.solvers.resize(count);
-  s.projective_solvers.resize(count);
-  s.positions.resize(numbers);
-  s.velocities.resize(numbers);
-  s.kept = ZeroedNumbers(numbers * s.settings.kept_steps.size());
-  s.stats.resize(count * s.steps());
+  s.holds = environments.empty() ? 0 : std::ssize(environments.front().holds);
+  s.kept = ZeroedNumbers(3 * s.count * s.vertices * s.settings.kept_steps.size());
+  s.stats.resize(s.count * s.steps());
   s.hold_forces.resize(3 * s.holds * s.stats.size());
-  s.contacts.resize(count);
+  s.contacts.resize(s.count);
   if (s.settings.contacts) {
     s.bodies = std::ssize(s.plan->bodies);
-    for (const Environment& environment : s.environments)
+    for (const Environment& environment : environments)
       s.obstacles = std::max(s.obstacles, std::ssize(environment.obstacles));
-    s.body_resultants.resize(6 * count * s.bodies);
-    s.obstacle_resultants.resize(6 * count * s.obstacles);
+    s.body_resultants.resize(6 * s.count * s.bodies);
+    s.obstacle_resultants.resize(6 * s.count * s.obstacles);
   }
-  for (int e = 0; e < size(); ++e) {
-    s.keep(e, s.step);
-    s.show(e);
+  if (s.settings.device == Device::cpu) {
+    s.worlds.emplace(s.plan, std::move(environments),
+                     WorldSettings{.solver = s.settings.solver,
+                                   .projective = s.settings.projective,
+                                   .first_step = s.settings.first_step,
+                                   .threads = s.settings.threads});
+  } else {
+    check_environments(*s.plan, environments);
+    s.environments = std::move(environments);
+    s.positions.resize(3 * s.count * s.vertices);
+    s.velocities.resize(3 * s.count * s.vertices);
+    for (int e = 0; e < size(); ++e) s.show(e);
   }
+  for (int e = 0; e < size(); ++e) s.keep(e, s.step);
 }
 
 Batch::~Batch() = default;
 Batch::Batch(Batch&&) noexcept = default;
 
-int Batch::size() const { return static_cast<int>(storage_->environments.size()); }
+int Batch::size() const { return static_cast<int>(storage_->count); }
 int Batch::step() const { return storage_->step; }
 
 void Batch::advance(int steps, const std::function<void(int)>& finished) {
@@ -230,44 +208,36 @@ void Batch::advance(int steps, const std::function<void(int)>& finished) {
   if (s.step < 0) throw std::invalid_argument("batch: it cannot advance after it has thrown");
   if (steps < 0 || steps > s.settings.steps - s.step)
     throw std::invalid_argument("batch: it cannot advance beyond its last step");
-  const std::atomic<bool>* stop = s.settings.solver.stop;
-  const auto throw_if_stopped = [&] {
-    if (stop != nullptr && *stop) throw data::Stopped();
-  };
   const int first = std::exchange(s.step, -1);
-  if (s.settings.device == Device::cuda) {
-    throw_if_stopped();
+  if (s.worlds) {
+    s.advance_on_processor(first, steps, finished);
+  } else {
+    if (s.settings.solver.stop != nullptr && *s.settings.solver.stop) throw data::Stopped();
     s.advance_on_device(first, steps, finished);
-    s.step = first + steps;
-    return;
   }
-  data::for_each_in_parallel(s.environments.size(), s.settings.threads, [&](std::size_t index) {
-    const int e = static_cast<int>(index);
-    throw_if_stopped();
-    for (int k = 0; k < steps; ++k) {
-      s.take_step(e, first + k);
-      // A solver that was stopped in a step did not solve it as well as it can: the step is no result.
-      throw_if_stopped();
-    }
-    s.show(e);
-    if (s.settings.contacts && steps > 0) s.keep_contacts(e);
-    if (first + steps == s.settings.steps) {
-      s.solvers[e].reset();
-      s.projective_solvers[e].reset();
-    }
-    if (finished) finished(e);
-  });
   s.step = first + steps;
 }
 
-const State& Batch::state(int environment) const { return storage_->environments[environment].state; }
+Lost Batch::lost(int environment) const {
+  return storage_->worlds ? storage_->worlds->lost(environment) : Lost::no;
+}
+
+std::string Batch::why_lost(int environment) const {
+  return storage_->worlds ? storage_->worlds->why_lost(environment) : std::string();
+}
+
+const State& Batch::state(int environment) const { return storage_->state(environment); }
 
 View<double> Batch::positions() const {
-  return dense(storage_->positions.data(), {size(), storage_->vertices, 3});
+  const Storage& s = *storage_;
+  return dense(s.worlds ? static_cast<const double*>(s.worlds->positions().data) : s.positions.data(),
+               {size(), s.vertices, 3});
 }
 
 View<double> Batch::velocities() const {
-  return dense(storage_->velocities.data(), {size(), storage_->vertices, 3});
+  const Storage& s = *storage_;
+  return dense(s.worlds ? static_cast<const double*>(s.worlds->velocities().data) : s.velocities.data(),
+               {size(), s.vertices, 3});
 }
 
 View<double> Batch::kept_positions() const {

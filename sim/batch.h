@@ -8,11 +8,13 @@
 #include <vector>
 
 #include "sim/device.h"
+#include "sim/newton/restart_interval.h"
 #include "sim/newton/solver.h"
 #include "sim/oracle/projective.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 #include "sim/step/contact_force.h"
+#include "sim/world.h"
 
 namespace flash::sim {
 
@@ -52,18 +54,13 @@ struct BatchSettings {
   std::vector<int> cuda_devices{};  ///< by number, which share the environments; empty: the first
 };
 
-/// Steps after which a solver forgets what it holds besides the state of its environment. A replay that goes
-/// on from a state at a multiple of them is bitwise the one that was not interrupted.
-inline constexpr int restart_interval = 50;
-
-/// Many environments over one plan, each with its own material, for a whole replay. Environment e of a batch
-/// equals the same environment alone, bitwise, on any number of threads and however often it advances. On a
-/// device that holds where it advances by multiples of restart_interval.
+/// Many environments over one plan, each with its own material, for a whole replay: on the processor a loop
+/// over Worlds. Environment e of a batch equals the same environment alone, bitwise, on any number of threads
+/// and however often it advances. On a device that holds where it advances by multiples of restart_interval.
 class Batch {
  public:
-  /// Throws std::invalid_argument where the environments do not have the plan's vertices and the same number
-  /// of holds, where the solids of both are not the same, where a frame is not in the schedule, or the steps
-  /// do not ascend from first_step to `steps`. Throws data::InputError as check_stiffness does.
+  /// Throws as Worlds does, and std::invalid_argument where the steps do not ascend from first_step to
+  /// `steps`.
   Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments, BatchSettings settings);
   ~Batch();
   Batch(Batch&&) noexcept;
@@ -73,9 +70,15 @@ class Batch {
 
   /// Takes the next `steps` steps of each environment. The thread that took them calls `finished` with the
   /// number of the environment, so that its results can be used while others go on. Unconverged steps are
-  /// in the statistics, never thrown. Throws what a worker threw, a DeviceError as advance_on_device does,
-  /// data::Stopped where settings.solver.stop ended it; a batch that has thrown cannot advance any more.
+  /// in the statistics, never thrown. An environment that is lost finishes too: it stays where it was, and
+  /// the steps it did not take are unconverged, with an infinite residual. Throws what a worker threw, a
+  /// DeviceError as advance_on_device does, data::Stopped where settings.solver.stop ended it; a batch that
+  /// has thrown cannot advance any more.
   void advance(int steps, const std::function<void(int)>& finished = {});
+
+  /// Whether and why an environment is lost, as Worlds says. On a device none is.
+  Lost lost(int environment) const;
+  std::string why_lost(int environment) const;
 
   /// The state of one environment: another batch can go on from it.
   const State& state(int environment) const;

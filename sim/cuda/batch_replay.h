@@ -11,6 +11,7 @@
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/layout/front_plan.h"
 #include "sim/cuda/layout/inverse_layout.h"
+#include "sim/newton/restart_interval.h"
 #include "sim/oracle/projective.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
@@ -71,7 +72,7 @@ struct ReplaySettings {
   int first_step = 0;             ///< at which the environments stand
   int steps = 0;                  ///< the last one
   std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; step 0 is the start
-  int restart_interval = 10;      ///< steps after which a solver forgets its factor and may change its team
+  int restart_interval = device_restart_interval;  ///< a solver may change its team there
   int team_blocks = 0;  ///< processors that work on an environment, 1, 2, 4 or 8; 0: team_stages has it
   FrontSettings fronts{};
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "sim/newton/newton_matrix.h"
@@ -14,7 +15,7 @@ struct NewtonWorkspace {
   std::shared_ptr<const SheetPlan> plan;
   SolverSettings settings;
   NewtonMatrix matrix;
-  std::unique_ptr<LayerMemory> layers;  ///< made where the surface first meets itself
+  std::optional<LayerMemory> layers;  ///< made where the surface first meets itself
   bool refactor = true;  ///< whether the next solve needs a new factor: none yet, or the sheet has moved on
   data::Points factored_springs;  ///< those that the factor knows, as IncrementalPotential tells them
   Iterate now;                    ///< where the iteration stands; between steps the end of the last one

@@ -122,7 +122,7 @@ bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& repo
 /// takes the first exit that does not tear it. Returns whether the step is solved.
 bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport& report) {
   const double exit_speed = w.settings.exit_speed;
-  LayerMemory* layers = environment.self_contact ? w.layers.get() : nullptr;
+  LayerMemory* layers = environment.self_contact ? &*w.layers : nullptr;
   const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed}, layers);
   bool solved = solve_step(problem, w, report);
   if (report.start_penetration.depth > 0) {
@@ -287,14 +287,19 @@ Solver::Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& sett
 Solver::Solver(const Sheet& sheet, const SolverSettings& settings)
     : Solver(make_sheet_plan(sheet), settings) {}
 Solver::~Solver() = default;
+Solver::Solver(const Solver& other) : workspace_(std::make_unique<NewtonWorkspace>(*other.workspace_)) {}
 Solver::Solver(Solver&&) noexcept = default;
+Solver& Solver::operator=(Solver other) noexcept {
+  workspace_ = std::move(other.workspace_);
+  return *this;
+}
 
 StepReport Solver::step(Environment& environment) {
   NewtonWorkspace& w = *workspace_;
   const double h = w.settings.time_step;
   update_holds(environment, environment.state.time + h);
   if (environment.self_contact && !w.layers) {
-    w.layers = std::make_unique<LayerMemory>(w.plan->sheet);
+    w.layers.emplace(w.plan->sheet);
     check_thickness(w.plan->sheet, w.layers->surface, environment.self_contact->thickness);
     check_start(w.plan->sheet, w.layers->surface, environment.state.positions);
     check_apart(w.plan->sheet, w.layers->surface, environment);

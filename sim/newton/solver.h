@@ -26,7 +26,10 @@ class Solver {
   Solver(const Sheet& sheet, const SolverSettings& settings);
   Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings);
   ~Solver();
+  /// A copy goes on as the one it is of, bitwise. It takes as much memory.
+  Solver(const Solver&);
   Solver(Solver&&) noexcept;
+  Solver& operator=(Solver) noexcept;
 
   /// Advances environment.state by one time step. An unconverged step is reported, never thrown. Throws
   /// data::InputError for a material that the sheet cannot have, such as a plate with a rest shape not flat,

@@ -34,6 +34,12 @@ struct ProjectiveSolver::Workspace {
   std::vector<ProjectiveContact> contacts;  ///< of the end of the last step
   VectorXd multiplier;                      ///< theirs
 
+  Workspace(std::shared_ptr<const SheetPlan> plan_in, const ProjectiveSettings& settings_in)
+      : plan(std::move(plan_in)), settings(settings_in) {}
+  /// Systems are of materials alone, and made anew.
+  Workspace(const Workspace& other)
+      : plan(other.plan), settings(other.settings), contacts(other.contacts), multiplier(other.multiplier) {}
+
   ProjectiveSystem& system_of(const std::vector<data::SheetMaterial>& materials) {
     for (auto& [known, system] : systems)
       if (known == materials) return system;
@@ -137,12 +143,15 @@ void report_forces(const Environment& environment, const ProjectiveSettings& set
 ProjectiveSolver::ProjectiveSolver(const Sheet& sheet, const ProjectiveSettings& settings)
     : ProjectiveSolver(make_sheet_plan(sheet), settings) {}
 ProjectiveSolver::ProjectiveSolver(std::shared_ptr<const SheetPlan> plan, const ProjectiveSettings& settings)
-    : workspace_(std::make_unique<Workspace>()) {
-  workspace_->plan = std::move(plan);
-  workspace_->settings = settings;
-}
+    : workspace_(std::make_unique<Workspace>(std::move(plan), settings)) {}
 ProjectiveSolver::~ProjectiveSolver() = default;
+ProjectiveSolver::ProjectiveSolver(const ProjectiveSolver& other)
+    : workspace_(std::make_unique<Workspace>(*other.workspace_)) {}
 ProjectiveSolver::ProjectiveSolver(ProjectiveSolver&&) noexcept = default;
+ProjectiveSolver& ProjectiveSolver::operator=(ProjectiveSolver other) noexcept {
+  workspace_ = std::move(other.workspace_);
+  return *this;
+}
 
 ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   Workspace& w = *workspace_;

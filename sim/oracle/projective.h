@@ -50,7 +50,10 @@ class ProjectiveSolver {
   ProjectiveSolver(const Sheet& sheet, const ProjectiveSettings& settings);
   ProjectiveSolver(std::shared_ptr<const SheetPlan> plan, const ProjectiveSettings& settings);
   ~ProjectiveSolver();
+  /// A copy goes on as the one it is of, bitwise.
+  ProjectiveSolver(const ProjectiveSolver&);
   ProjectiveSolver(ProjectiveSolver&&) noexcept;
+  ProjectiveSolver& operator=(ProjectiveSolver) noexcept;
 
   /// Advances environment.state by one time step. The state returned is the iterate whose residual is
   /// reported.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "data/error.h"
 #include "data/text.h"
 
 namespace flash::sim {
@@ -21,24 +20,32 @@ double distance_to_box(const Vector3d& half_extents, const Vector3d& point) {
   return (point.cwiseAbs() - half_extents).cwiseMax(0.0).norm();
 }
 
-std::vector<int> vertices_in_reach(const Hold& hold, const State& state, const Isometry3d& frame_from_base) {
+struct InReach {
   std::vector<int> vertices;
-  double nearest = std::numeric_limits<double>::infinity();
-  const int end = hold.reach->vertex_count < 0 ? static_cast<int>(state.positions.rows())
-                                               : hold.reach->first_vertex + hold.reach->vertex_count;
-  for (int i = hold.reach->first_vertex; i < end; ++i) {
+  double nearest = std::numeric_limits<double>::infinity();  ///< distance of the nearest of all [m]
+};
+
+InReach in_reach(const Reach& reach, const State& state, const Isometry3d& frame_from_base) {
+  InReach found;
+  const int end = reach.vertex_count < 0 ? static_cast<int>(state.positions.rows())
+                                         : reach.first_vertex + reach.vertex_count;
+  for (int i = reach.first_vertex; i < end; ++i) {
     const Vector3d point = frame_from_base * Vector3d(state.positions.row(i));
-    const double distance = distance_to_box(hold.reach->half_extents, point);
-    nearest = std::min(nearest, distance);
-    if (distance <= hold.reach->threshold) vertices.push_back(i);
+    const double distance = distance_to_box(reach.half_extents, point);
+    found.nearest = std::min(found.nearest, distance);
+    if (distance <= reach.threshold) found.vertices.push_back(i);
   }
-  if (vertices.empty())
-    throw data::input_error("end effector " + hold.name, "grasps",
-                            "no vertex of " + hold.reach->object + " within " +
-                                data::format_short(hold.reach->threshold) + " m of its box at " +
-                                data::format_short(state.time) + " s; the nearest is " +
-                                data::format_short(nearest) + " m away");
-  return vertices;
+  return found;
+}
+
+std::vector<int> vertices_in_reach(const Hold& hold, const State& state, const Isometry3d& frame_from_base) {
+  InReach found = in_reach(*hold.reach, state, frame_from_base);
+  if (found.vertices.empty())
+    throw MissedGrasp("end effector " + hold.name + ": grasps: no vertex of " + hold.reach->object +
+                      " within " + data::format_short(hold.reach->threshold) + " m of its box at " +
+                      data::format_short(state.time) + " s; the nearest is " +
+                      data::format_short(found.nearest) + " m away");
+  return std::move(found.vertices);
 }
 
 HeldVertices take(const Hold& hold, const State& state, const Isometry3d& frame, double time) {
@@ -75,6 +82,12 @@ double friction_between(const Environment& environment, const Obstacle& obstacle
 
 Isometry3d frame_pose(const Environment& environment, int frame, double time) {
   return frame == base_frame ? Isometry3d::Identity() : pose_at(*environment.schedule, frame, time);
+}
+
+bool has_vertex_in_reach(const Environment& environment, const Hold& hold) {
+  const State& state = environment.state;
+  return !in_reach(*hold.reach, state, frame_pose(environment, hold.frame, state.time).inverse())
+              .vertices.empty();
 }
 
 void update_holds(Environment& environment, double time) {

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "data/error.h"
 #include "data/material.h"
 #include "data/mesh.h"
 #include "sim/scene/hold.h"
@@ -130,11 +131,19 @@ double friction_between(const Environment& environment, const Obstacle& obstacle
 /// Pose of a frame of the environment's schedule at `time` [s]; that of the base frame is the identity.
 Eigen::Isometry3d frame_pose(const Environment& environment, int frame, double time);
 
+/// A reach had no vertex in it; the message has the distance of the nearest.
+struct MissedGrasp : data::InputError {
+  using data::InputError::InputError;
+};
+
+/// Whether a hold with a reach would take a vertex where the environment stands.
+bool has_vertex_in_reach(const Environment& environment, const Hold& hold);
+
 /// Closes and opens the holds for the step that ends at `time` [s]: a hold acts in the steps whose middle
 /// lies between its `from` and `to`, so that one that follows another leaves no step out. One that closes
 /// stores in environment.state.held which vertices it takes and where they are in its frame; one that opens
-/// forgets them. Throws data::InputError where a reach has no vertex in it, with the distance of the nearest,
-/// and as check_stiffness does.
+/// forgets them. Throws MissedGrasp where a reach has no vertex in it, and data::InputError as
+/// check_stiffness does.
 void update_holds(Environment& environment, double time);
 
 /// Whether nothing is still to come: every hold has closed, has its vertices at their targets and does not

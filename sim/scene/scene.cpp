@@ -287,7 +287,8 @@ std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::ve
   if (scene.solver.integrator == "newton" && scene.solver.constraint_solver.starts_with("Lite"))
     notices.push_back(
         "contacts are met exactly by the newton integrator; solver.type projective has the inertia metric");
-  if (data::asks_for_cuda(scene.solver)) notices.push_back("no CUDA backend here: running on the CPU");
+  if (data::asks_for_cuda(scene.solver))
+    notices.push_back("the solver asks for CUDA: scenes run on the CPU alone so far");
   return bodies;
 }
 

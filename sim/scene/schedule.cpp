@@ -26,10 +26,11 @@ std::shared_ptr<const Schedule> make_schedule(std::span<const data::Trajectory> 
 Isometry3d pose_at(const Schedule& schedule, int frame, double time) {
   constexpr double rounding = 1e-6;  // of a time that is a sum of steps, in steps
   const std::vector<Isometry3d>& poses = schedule.frames.at(static_cast<std::size_t>(frame));
-  const double last = static_cast<double>(poses.size() - 1);
-  const double step = std::clamp((time - schedule.start) / schedule.time_step, 0.0, last);
+  const double first = static_cast<double>(schedule.first),
+               last = first + static_cast<double>(poses.size() - 1);
+  const double step = std::clamp((time - schedule.start) / schedule.time_step, first, last);
   const double before = std::floor(step + rounding);
-  const auto index = static_cast<std::size_t>(before);
+  const auto index = static_cast<std::size_t>(before - first);
   const double share = step - before;
   if (share <= rounding) return poses[index];
   if (share >= 1 - rounding) return poses[index + 1];

@@ -12,9 +12,10 @@ namespace flash::sim {
 /// even steps of time. A trajectory is sampled once; environments that see the same motion share the
 /// schedule.
 struct Schedule {
-  double start = 0.0;                                  ///< time of the first pose of every frame [s]
+  double start = 0.0;                                  ///< time of pose 0 of every frame [s]
   double time_step = 0.01;                             ///< between two poses [s]
   std::vector<std::vector<Eigen::Isometry3d>> frames;  ///< poses of each frame; the last one stays for good
+  long first = 0;  ///< number of the first pose of every frame: those before it are not there any more
 };
 
 /// Samples `trajectories` at `start` and at the ends of the `steps` steps that follow, a frame each.

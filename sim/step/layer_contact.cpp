@@ -110,10 +110,12 @@ LayerStep::LayerStep(LayerMemory& memory, const Environment& environment, double
       environment_(environment),
       settings_(*environment.self_contact),
       time_step_(time_step),
-      other_pairs_(memory.carried != carried || memory.thickness != settings_.thickness) {
+      other_pairs_(memory.carried != carried || memory.thickness != settings_.thickness ||
+                   memory.pressure != settings_.pressure) {
   if (!other_pairs_) return;
   memory_.carried = carried;
   memory_.thickness = settings_.thickness;
+  memory_.pressure = settings_.pressure;
   memory_.near.boxes.clear();
 }
 

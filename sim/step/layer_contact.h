@@ -44,8 +44,8 @@ struct LayerMemory {
 
   PairSurface surface;
   BoxedPairs near;  ///< of an iterate; they serve as long as vertices stay in their boxes
-  // What these pairs are of: another thickness and other holds have others.
-  double thickness = 0;
+  // What these pairs, and their energy, are of: another thickness and other holds have others.
+  double thickness = 0, pressure = 0;
   std::vector<bool> carried;
 };
 
@@ -68,7 +68,7 @@ class LayerStep {
   LayerStep(const LayerStep&) = default;
   virtual ~LayerStep() = default;
 
-  /// Whether there are other pairs than in the last step.
+  /// Whether there are other pairs than in the last step, or others that press as they did not.
   bool has_other_pairs() const { return other_pairs_; }
 
   /// Adds what each vertex needs from outside against pressure and friction at `positions` to `force` [N].

@@ -271,8 +271,11 @@ std::vector<int> every_step(const Replay& replay) {
 
 namespace {
 
+/// Throws data::InputError for what the solver refuses, which all candidates share. One that is lost in
+/// another way has steps that are not solved, and the others go on.
 ReplayResult result_of(const Replay& replay, const std::vector<int>& kept, const sim::Batch& batch,
                        int environment) {
+  if (batch.lost(environment) == sim::Lost::refused) throw data::InputError(batch.why_lost(environment));
   ReplayResult result;
   Motion& motion = result.motion;
   motion = {replay.start, replay.settings.solver.time_step, {}};

@@ -55,7 +55,7 @@ void run(int side, int environments, int steps, InversePrecision precision, int 
   settings.precision = precision;
   settings.team_blocks = team_blocks;
   settings.threads = 0;
-  settings.restart_interval = 50;
+  settings.restart_interval = restart_interval;
   settings.projective.emplace();
   settings.projective->iterations = 5;
   settings.projective->acceleration = 0;

@@ -23,6 +23,14 @@ if(NOT output MATCHES "^-0\\.05395")
   message(FATAL_ERROR "the consumer printed ${output}, expected -0.05395")
 endif()
 
+run(${work}/build/worlds)
+# A corner that is taken on the table follows the gripper to 0.1 m.
+string(REGEX MATCHALL "environment [0-3]: its corner is at 0\\.100 m, the gripper pulls 0\\.[0-9]+ N \n" lifted "${output}")
+list(LENGTH lifted count)
+if(NOT count EQUAL 4)
+  message(FATAL_ERROR "the example printed ${output}, expected four corners at 0.100 m")
+endif()
+
 if(CALIB)
   run(${work}/build/hand_eye)
   # The camera of these pairs, which are exact, is at (1, 0.5, 0.25) m.

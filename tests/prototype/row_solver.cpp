@@ -70,7 +70,8 @@ StepReport RowSolver::advance(Environment& environment, double h, int halvings) 
 }
 
 bool RowSolver::try_step(Environment& environment, double h, StepReport& report) {
-  StepProblem problem(*w_.plan, environment, h, {.speed = w_.settings.exit_speed}, w_.layers.get());
+  StepProblem problem(*w_.plan, environment, h, {.speed = w_.settings.exit_speed},
+                      w_.layers ? &*w_.layers : nullptr);
   problem.layers = std::make_unique<RowLayers>(*problem.layers, multipliers_);
   multipliers_.penalty = first_penalty(problem);
 

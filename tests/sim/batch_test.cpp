@@ -160,17 +160,64 @@ TEST(Batch, ContactsAreThoseOfItsEnvironmentsAloneBitForBit) {
   }
 }
 
-// A plate needs a flat rest shape. What a worker finds out must reach the caller, not end the program.
-TEST(Batch, WhatAWorkerThrowsReachesTheCaller) {
+// A plate needs a flat rest shape.
+TEST(Batch, NamesTheEnvironmentThatItsMeshCannotBe) {
   data::TriangleMesh curved = data::rectangle({.width = 0.1, .height = 0.1, .cells_x = 3, .cells_y = 3});
   for (Eigen::Index i = 0; i < curved.vertices.rows(); ++i)
     curved.vertices(i, 2) = 5 * curved.vertices(i, 0) * curved.vertices(i, 0);
   const Sheet sheet = make_sheet(curved);
-  Environment environment = environment_of(sheet);
-  environment.materials[0].bending_model = data::BendingModel::plate;
+  std::vector<Environment> environments(4, environment_of(sheet));
+  for (Environment& environment : environments)
+    environment.materials[0].bending_model = data::BendingModel::hinge;
+  environments[2].materials[0].bending_model = data::BendingModel::plate;
+  try {
+    Batch(make_sheet_plan(sheet), environments, {.steps = 2});
+    ADD_FAILURE() << "not refused";
+  } catch (const data::InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("environment 2: "), std::string::npos) << error.what();
+  }
+}
+
+// What is thrown on a worker must reach the caller, not end the program.
+TEST(Batch, WhatAWorkerThrowsReachesTheCaller) {
+  const Sheet sheet = small_sheet();
   for (const int threads : {1, 2, 4}) {
-    Batch batch(make_sheet_plan(sheet), std::vector(4, environment), {.steps = 2, .threads = threads});
-    EXPECT_THROW(batch.advance(2), data::InputError) << threads;
+    Batch batch(make_sheet_plan(sheet), std::vector(4, environment_of(sheet)),
+                {.steps = 2, .threads = threads});
+    EXPECT_THROW(batch.advance(1, [](int e) { throw std::length_error(std::to_string(e)); }),
+                 std::length_error)
+        << threads;
+    EXPECT_EQ(batch.step(), -1);
+    EXPECT_THROW(batch.advance(1), std::invalid_argument);
+  }
+}
+
+TEST(Batch, OneMissedGraspEndsNoOther) {
+  const Sheet sheet = small_sheet();
+  const auto plan = make_sheet_plan(sheet);
+  std::vector<Environment> environments = three_lifts(sheet);
+  for (Environment& environment : environments)
+    environment.holds.push_back(
+        {.name = "left", .from = 0.1, .reach = Reach{.object = "towel", .threshold = 0.05}});
+  environments[1].holds[1].reach->threshold = 1e-9;
+  environments[1].holds[1].reach->first_vertex = 20;
+  Batch batch(plan, environments, {.steps = 30, .kept_steps = {10, 30}, .threads = 2}),
+      alone(plan, {environments[0], environments[2]}, {.steps = 30});
+  std::vector<int> finished(3, 0);
+  for (const int steps : {15, 15})
+    batch.advance(steps, [&](int e) { ++finished[static_cast<std::size_t>(e)]; });
+  alone.advance(30);
+  EXPECT_EQ(finished, std::vector<int>(3, 2));
+  expect_same(batch.state(0), alone.state(0));
+  expect_same(batch.state(2), alone.state(1));
+  EXPECT_EQ(batch.why_lost(0), "");
+  EXPECT_EQ(batch.lost(1), Lost::no_vertex_in_reach);
+  EXPECT_NE(batch.why_lost(1).find("end effector left: grasps: no vertex of towel"), std::string::npos)
+      << batch.why_lost(1);
+  EXPECT_EQ(batch.kept_positions(1, 0), batch.kept_positions(1, 1));  // where it was
+  for (int k = 0; k < 30; ++k) {
+    EXPECT_EQ(std::isfinite(batch.stats(1)[static_cast<std::size_t>(k)].residual), k < 10);
+    EXPECT_EQ(batch.stats(1)[static_cast<std::size_t>(k)].converged, k < 10);
   }
 }
 

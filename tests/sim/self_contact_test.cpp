@@ -52,6 +52,21 @@ TEST(SelfContact, ASheetRestsOnAnotherAtItsThickness) {
   EXPECT_LT(world.environment.state.velocities.rowwise().norm().maxCoeff(), 1e-5);  // no creep
 }
 
+// What a solver keeps of the last step is of the pressure then: a thousand times it throws the layers apart,
+// and their energy did not come from nothing.
+TEST(SelfContact, AnotherPressureIsThatOfANewSolver) {
+  LayerScene world = pile(2, cloth, 0.1, 6);
+  Solver solver(world.sheet, {.time_step = h});
+  for (int k = 0; k < 20; ++k) solver.step(world.environment);
+  world.environment.self_contact->pressure *= 1000;
+  Environment same = world.environment;
+  Solver fresh(world.sheet, {.time_step = h});
+  const StepReport report = solver.step(world.environment), expected = fresh.step(same);
+  EXPECT_TRUE(expected.converged);
+  EXPECT_EQ(report.converged, expected.converged);
+  EXPECT_EQ(report.substeps, expected.substeps);
+}
+
 /// The speed of the last body along the slope after some steps [m/s].
 double speed_after(LayerScene scene, int steps) {
   Solver solver(scene.sheet, {.time_step = h});
