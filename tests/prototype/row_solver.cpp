@@ -39,7 +39,7 @@ std::vector<TouchStiffness> stiffness_beside_rows(const StepProblem& problem, co
 
 RowSolver::RowSolver(const Sheet& sheet, RowMethod method, const SolverSettings& settings)
     : method_(method), w_(make_sheet_plan(sheet), settings), matrix_(w_.plan) {
-  w_.layers = std::make_unique<LayerMemory>(sheet);
+  w_.layers.emplace(sheet);
 }
 
 StepReport RowSolver::step(Environment& environment) {
