@@ -80,7 +80,9 @@ TEST(ObstacleSurfaces, WhatHasNoEndReachesPastTheBox) {
 
 TEST(ObstacleSurfaces, StandWhereTheyAreAtTheTime) {
   EXPECT_NEAR(only_surface(box_of(Vector3d::Ones(), moved_up()), 0.5).vertices.col(2).mean(), 1, 1e-12);
-  EXPECT_NEAR(only_surface(SceneCapsule{{}, Vector3d::UnitX(), 0, 0.1, moved_up()}, 1).vertices.col(2).mean(),
+  EXPECT_NEAR(only_surface(SceneCapsule{Vector3d::Zero(), Vector3d::UnitX(), 0, 0.1, moved_up()}, 1)
+                  .vertices.col(2)
+                  .mean(),
               2, 1e-12);
 }
 

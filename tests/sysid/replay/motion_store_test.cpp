@@ -33,7 +33,7 @@ Replay recorded(const data::TemporaryFolder& folder, const std::string& kind, un
   settings.name = kind;
   settings.kind = kind;
   settings.duration = 0.6;
-  settings.grasp_within = 0.051;
+  settings.grasp_within = 0.05;
   settings.seed = seed;
   settings.forces = forces;
   SynthCamera camera;
