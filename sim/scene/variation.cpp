@@ -88,7 +88,7 @@ bool applies(const Variation& variation, const Environment& environment) {
 double factor_of(const std::vector<Variation>& variations, std::size_t index, int number) {
   if (number == 0) return 1;
   const Variation& variation = variations[index];
-  const double share = radical_inverse(number, bases[index]);
+  const double share = radical_inverse(number + 1, bases[index]);
   return variation.logarithmic ? variation.low * std::pow(variation.high / variation.low, share)
                                : variation.low + share * (variation.high - variation.low);
 }

@@ -28,7 +28,8 @@ bool applies(const Variation& variation, const Environment& environment);
 
 /// The factor of `variations[index]` in environment `number`. Environment 0 is the scene itself, and has 1.
 /// The others are spread evenly over all variations together, whatever their number: the points of Halton
-/// (1960), of which the first ones are those of any smaller number of environments.
+/// (1960) from the second on, of which the first ones are those of any smaller number of environments. The
+/// first one is the middle of the first range, often the scene itself.
 double factor_of(const std::vector<Variation>& variations, std::size_t index, int number);
 
 /// Environment `number` of those that differ from `environment`.

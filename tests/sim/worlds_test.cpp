@@ -51,7 +51,9 @@ TEST(Worlds, PosesGivenStepByStepAreThoseOfASchedule) {
       for (const StepStats& step : batch.stats(e)) parts = std::max(parts, step.substeps);
       EXPECT_EQ(worlds.status(e).residual, batch.stats(e).back().residual);
     }
-    EXPECT_EQ(parts > 1, iterations == 3);
+    if (iterations == 3) {
+      EXPECT_GT(parts, 1);  // or nothing was seen of halves
+    }
   }
 }
 

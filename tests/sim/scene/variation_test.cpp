@@ -35,11 +35,11 @@ TEST(Variation, ReadsRangesOfFactors) {
     EXPECT_THROW(parse_variations(wrong, "--vary"), data::InputError) << wrong;
 }
 
-// The points of Halton in bases 2 and 3, by hand.
+// The points of Halton in bases 2 and 3 from the second on, by hand.
 TEST(Variation, SpreadsEnvironmentsEvenlyAndLeavesTheFirst) {
   const std::vector<Variation> variations = {{"friction", 1, 2, false}, {"young", 0.1, 10, true}};
-  const double halves[] = {0.5, 0.25, 0.75, 0.125, 0.625},
-               thirds[] = {1. / 3, 2. / 3, 1. / 9, 4. / 9, 7. / 9};
+  const double halves[] = {0.25, 0.75, 0.125, 0.625, 0.375},
+               thirds[] = {2. / 3, 1. / 9, 4. / 9, 7. / 9, 2. / 9};
   for (std::size_t k = 0; k < 2; ++k) EXPECT_EQ(factor_of(variations, k, 0), 1);
   for (int e = 1; e <= 5; ++e) {
     EXPECT_NEAR(factor_of(variations, 0, e), 1 + halves[e - 1], 1e-15);
