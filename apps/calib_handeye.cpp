@@ -128,6 +128,8 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
         c.size->estimate, c.size->sd, fixed(warp.x(), 2).c_str(), warp_sd.x(), fixed(warp.y(), 2).c_str(),
         warp_sd.y(), fixed(warp.z(), 2).c_str(), warp_sd.z());
     if (c.edges) std::printf("%s\n", calib::describe(*c.edges).c_str());
+  } else if (c.size && c.size->sd > 0) {
+    std::printf("target: %.4f +- %.4f times as large as stated\n", c.size->estimate, c.size->sd);
   }
   if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
     std::printf("joints are farther than they say by");

@@ -70,8 +70,8 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
       "%.2f mm\n",
       warp.x(), sd.x(), warp.y(), sd.y(), warp.z(), sd.z());
   if (estimate.edges) std::printf("%s\n", calib::describe(*estimate.edges).c_str());
-  std::printf("%.3f px rms a corner; places at the picture's corners known to %.2g px\n", estimate.rms,
-              estimate.corner_sd);
+  std::printf("%.3f px rms a corner; places at the picture's corners known to %.2g px%s\n", estimate.rms,
+              estimate.corner_sd, estimate.corner_sd < calib::most_corner_sd ? "" : ", or not at all");
 }
 
 // Corners are found twice: the lens must be known for places at which straight things are straight.

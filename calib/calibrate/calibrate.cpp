@@ -344,7 +344,8 @@ void warn(Calibration& result) {
     result.warnings.push_back(std::to_string(result.selection.renumbered) +
                               " views had the target numbered from its other end; put right");
   bool unusable = false;
-  const std::string noisy = unusual_noise(result.refined.noise, unusable);
+  const std::string noisy = has_pixels(result) ? unusual_noise(result.refined.noise, unusable)
+                                               : unusual_scatter(result.refined.noise);
   // Noise that a size makes which is to be kept is that size's.
   const bool of_size = result.size && result.size->prior_sd == 0 && result.size->far_off();
   if (!noisy.empty()) tell_first(result, noisy, unusable && !of_size);

@@ -6,6 +6,8 @@
 #include <cstdio>
 
 #include "calib/solve/pose_space.h"
+#include "data/chi_square.h"
+#include "data/error.h"
 
 namespace flash::calib {
 namespace {
@@ -79,6 +81,83 @@ void check_halves(Calibration& result, const std::vector<PoseLoop>& loops,
   result.warnings.emplace_back(text);
 }
 
+constexpr double kUsualSize = 0.01;  // standard deviation of what a size that is stated is off by
+
+/// The size that pairs want, with nothing known of it. None where they do not tell it to a tenth.
+std::optional<TargetSize::Wanted> wanted_size(const std::vector<PoseLoop>& loops,
+                                              const std::vector<Eigen::Vector3d>& places,
+                                              const HandEyePoses& seed) {
+  constexpr double kUnknown = 0.1;
+  const PoseSpaceFit fit = fit_pose_space(loops, seed, SizeUnknown{});
+  const double noise = std::sqrt(fit.covariance(12, 12));
+  if (!fit.converged || !(noise < kUnknown)) return std::nullopt;
+  // Whose the noise is.
+  const double of_robot = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 0}).size,
+               of_camera = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 1}).size;
+  // What the halves of the robot's places do not agree on, none of them sees by itself.
+  double apart = 0;
+  constexpr Split kSplits[] = {Split::consecutive, Split::place_1, Split::place_2, Split::place_3};
+  for (const Split split : kSplits) {
+    const std::vector<int> half = halves_of(places, split);
+    std::vector<PoseLoop> parts[2];
+    for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
+    const double ratio = fit_pose_space(parts[0], fit.poses, SizeUnknown{}).size /
+                         fit_pose_space(parts[1], fit.poses, SizeUnknown{}).size;
+    apart += std::pow(0.5 * std::log(ratio), 2) / static_cast<double>(std::size(kSplits));
+  }
+  return TargetSize::Wanted{fit.size, fit.size * std::hypot(std::max(noise, std::sqrt(apart)),
+                                                            0.5 * std::log(of_camera / of_robot))};
+}
+
+/// What the size is taken to be, and the pairs as seen of a target of that size.
+TargetSize settle_size(std::vector<PoseLoop>& loops, const std::vector<Eigen::Vector3d>& places,
+                       const HandEyePoses& seed, const CalibrateSettings& settings) {
+  TargetSize size{.prior_sd = settings.target_size_sd.value_or(kUsualSize)};
+  constexpr std::size_t kEnough = 8;
+  if (loops.size() >= kEnough) size.wanted = wanted_size(loops, places, seed);
+  if (std::isinf(size.prior_sd) && !size.wanted)
+    throw data::InputError(
+        "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
+        "out, or add views farther apart");
+  if (!settings.target_size_sd || size.prior_sd == 0 || settings.size_as_stated || !size.wanted) return size;
+  // Of what is known and what pairs want, by their deviations.
+  const double known = std::isinf(size.prior_sd) ? 0 : std::pow(size.prior_sd, -2),
+               seen = std::pow(size.wanted->sd, -2);
+  size.estimate = (known + seen * size.wanted->estimate) / (known + seen);
+  size.sd = 1 / std::sqrt(known + seen);
+  loops = resized(std::move(loops), size.estimate);
+  return size;
+}
+
+/// How X follows a size that is off by `sd`.
+Matrix6d covariance_of_size(const std::vector<PoseLoop>& loops, const HandEyePoses& poses, double sd) {
+  constexpr double kStep = 1e-3;
+  const Vector6d shift = motion_between(fit_pose_space(resized(loops, 1 - kStep), poses).poses.X,
+                                        fit_pose_space(resized(loops, 1 + kStep), poses).poses.X) *
+                         (sd / (2 * kStep));
+  return shift * shift.transpose();
+}
+
+/// A size that pairs exclude is the cause of whatever else does not fit, and of an answer that depends on it.
+void tell_size(Calibration& result, const std::vector<PoseLoop>& loops, const CalibrateSettings& settings) {
+  const TargetSize& size = *result.size;
+  if (!size.far_off()) return;
+  const Eigen::Isometry3d other =
+      fit_pose_space(resized(loops, size.wanted->estimate / size.estimate), result.poses).poses.X;
+  const Vector6d away = motion_between(result.poses.X, other);
+  const bool depends = away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_95_of_6;
+  if (settings.size_as_stated) result.covariance += away * away.transpose();
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "the target is %.4g times as large as stated (+- %.2g, 2 sd), or the robot's translations are not "
+      "in metres: measure a square; the answer is for %.4g, and with the other size the camera is "
+      "%.1f mm and %.2f deg from where it is here (--target-size solved takes the estimate)",
+      size.wanted->estimate, 2 * size.wanted->sd, size.estimate, 1e3 * away.head<3>().norm(),
+      away.tail<3>().norm() * 180 / M_PI);
+  tell_first(result, text, depends && !settings.size_as_stated);
+}
+
 }  // namespace
 
 Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
@@ -86,10 +165,14 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   Calibration result;
   result.setup = setup;
   const std::vector<Observation> observations = prepare(result, all, {Symmetry{}}, settings);
-  const std::vector<PoseLoop> loops = pose_loops(setup, observations);
+  std::vector<Eigen::Vector3d> places;
+  for (const Observation& observation : observations)
+    places.push_back(observation.T_base_gripper.translation());
+  std::vector<PoseLoop> loops = pose_loops(setup, observations);
   // Half turns about three axes leave Shah's equations several solutions.
-  const PoseSpaceFit fit =
-      fit_pose_space(loops, better_of(loops, shah(loops), result.selection.robust_seed.poses));
+  const HandEyePoses seed = better_of(loops, shah(loops), result.selection.robust_seed.poses);
+  result.size = settle_size(loops, places, seed, settings);
+  const PoseSpaceFit fit = fit_pose_space(loops, seed);
   result.poses = fit.poses;
   result.covariance = result.repeatable = fit.covariance.topLeftCorner<6, 6>();
   result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation}, {0.0}};
@@ -108,11 +191,11 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .poses = fit.poses,
                                .relative = relative_rms(compared, fit.poses.X),
                                .held_out = result.held_out});
-  std::vector<Eigen::Vector3d> places;
-  for (const Observation& observation : observations)
-    places.push_back(observation.T_base_gripper.translation());
+  if (result.size->sd > 0)
+    result.repeatable = result.covariance += covariance_of_size(loops, fit.poses, result.size->sd);
   check_halves(result, loops, places);
   finish(result, observations);
+  tell_size(result, loops, settings);
   result.warnings.emplace_back(
       "pairs of poses tell the scatter alone: what the errors of an arm's model have in common is not in the "
       "stated standard deviations; pictures tell of it");

@@ -31,6 +31,12 @@ Eigen::Vector3d workspace_middle(const Bundle& bundle) {
   return middle / static_cast<double>(bundle.views.size());
 }
 
+/// Fewer pixels in the parts that were left out, by more than two standard errors of the difference.
+bool predicts_better(const HeldOut& held, const HeldOut& other) {
+  const MeanDifference more = mean_difference(means_of_folds(other, 0), means_of_folds(held, 0));
+  return more.mean > 2 * more.sd;
+}
+
 }  // namespace
 
 void compare_methods(Calibration& result, const std::vector<Observation>& observations, const Bundle& plain,
@@ -78,7 +84,7 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
   if (pixels) add(Method::pixels, refined);
   add(Method::errors_in_variables, refined);
   ComparedMethod* const last = &result.comparison.back();
-  if (pixels && last[-1].held_out->px < last->held_out->px) {
+  if (pixels && predicts_better(*last[-1].held_out, *last->held_out)) {
     std::swap(last[-1], *last);
     result.method = Method::pixels;
   }

@@ -77,6 +77,16 @@ std::string unusual_noise(const NoiseLevels& noise, bool& unusable, const ArmNoi
       1e3 * translation, rotation / kDegree, kAdvice);
 }
 
+std::string unusual_scatter(const NoiseLevels& noise, const ArmNoise& arm) {
+  const double translation = noise.translation.front(), rotation = noise.rotation.front();
+  if (translation < arm.doubtful_m && rotation < arm.doubtful_rad) return {};
+  return formatted(
+      "robot and camera scatter by %.1f mm and %.2f deg an axis together, and pairs of poses do not tell "
+      "whose it "
+      "is: the stated deviations hold it; if the camera sees the target better than that, %s",
+      1e3 * translation, rotation / kDegree, kAdvice);
+}
+
 std::string implausibility(const Calibration& calibration, const std::vector<Observation>& used,
                            const PlausibilitySettings& settings) {
   std::vector<Eigen::Isometry3d> target;

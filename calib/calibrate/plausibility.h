@@ -30,6 +30,10 @@ struct ArmNoise {
 /// where they are so by more than any arm.
 std::string unusual_noise(const NoiseLevels& noise, bool& unusable, const ArmNoise& arm = {});
 
+/// Likewise of pairs of poses, which do not tell the robot's noise from the camera's: one sentence that says
+/// how large both are together.
+std::string unusual_scatter(const NoiseLevels& noise, const ArmNoise& arm = {});
+
 /// Empty, or one sentence that says how badly the place of `what` is known. covariance: of its pose, right
 /// perturbation (dt, dtheta) [m, rad]; distance: from the camera to the target [m].
 std::string unknown_place(const std::string& what, const Matrix6d& covariance, double distance,

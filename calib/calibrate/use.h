@@ -11,8 +11,9 @@ namespace flash::calib {
 enum class Use {
   workspace,  ///< places seen by the camera, in the robot's frame: errors in variables, lens and print solved
               ///< for
-  image,      ///< pictures predicted through this robot: the fewest pixels, where that predicts them better
-  two_arms    ///< arms that one camera relates: the lens as stated, for all alike
+  image,    ///< pictures predicted through this robot: the fewest pixels, where that predicts them better by
+            ///< two standard errors
+  two_arms  ///< arms that one camera relates: the lens as stated, for all alike
 };
 const char* to_string(Use use);  ///< "workspace", "image", "two-arms"
 std::optional<Use> use_named(const std::string& name);

@@ -17,7 +17,6 @@ namespace flash::calib {
 namespace {
 
 constexpr int kLeastViews = 3;
-constexpr double kFarOff = 100;  // [px]
 
 struct Solution {
   data::CameraIntrinsics camera;
@@ -91,7 +90,8 @@ LensFit refined(const Solution& solution, const Eigen::Matrix3Xd& points,
                   unknowns(solution.camera.model), points, views);
 }
 
-/// Of the projection of the rays that now meet the corners of the picture; the worst, kFarOff at most [px].
+/// Of the projection of the rays that now meet the corners of the picture; the worst, most_corner_sd at most
+/// [px].
 double corner_deviation(const data::CameraIntrinsics& camera, const Eigen::MatrixXd& covariance) {
   const std::vector<int> used = unknowns(camera.model);
   double worst = 0;
@@ -102,11 +102,11 @@ double corner_deviation(const data::CameraIntrinsics& camera, const Eigen::Matri
       const Eigen::Vector2d met = project(to_vector(camera), ray, nullptr, &by_all);
       // Coefficients that the corners do not hold may fold the picture before its edge: no ray meets it
       // there.
-      if (!((met - Eigen::Vector2d(x, y)).norm() < 1)) return kFarOff;
+      if (!((met - Eigen::Vector2d(x, y)).norm() < 1)) return most_corner_sd;
       const Eigen::MatrixXd by_used = by_all(Eigen::all, used);
       worst = std::max(worst, std::sqrt((by_used * covariance * by_used.transpose()).trace()));
     }
-  return std::min(worst, kFarOff);
+  return std::min(worst, most_corner_sd);
 }
 
 double coverage(const std::vector<const Observation*>& views, int width, int height) {
@@ -130,8 +130,9 @@ std::vector<std::string> warnings_of(const IntrinsicsEstimate& estimate, std::si
     warnings.push_back("the focal length is known to " + percent(estimate.sd[0] / camera.fx) +
                        " only: add views that are closer and tilted");
   if (estimate.corner_sd > 1)
-    warnings.push_back("places at the corners of the picture are uncertain by " +
-                       data::format_short(estimate.corner_sd) + " px: let the target reach there");
+    warnings.push_back(
+        "places at the corners of the picture are uncertain by " + data::format_short(estimate.corner_sd) +
+        (estimate.corner_sd < most_corner_sd ? " px" : " px or more") + ": let the target reach there");
   if (estimate.coverage < 0.5)
     warnings.push_back("corners cover " + percent(estimate.coverage) +
                        " of the picture: distortion beyond is a guess");

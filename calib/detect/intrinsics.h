@@ -24,6 +24,9 @@ struct IntrinsicsView {
   std::string reason;  ///< why it was left out; empty where it was not
 };
 
+/// A deviation of so much says that nothing is known: it is printed as "100 px or more".
+inline constexpr double most_corner_sd = 100;  // [px]
+
 struct IntrinsicsEstimate {
   data::CameraIntrinsics camera;
   IntrinsicsVector sd =
@@ -32,10 +35,10 @@ struct IntrinsicsEstimate {
   WarpEstimate warp;                                   ///< of the target, solved for beside the lens
   std::optional<EdgeOffset> edges;                     ///< likewise, of a target with corners of edges
   double rms = 0;                                      ///< reprojection, 2-D rms per corner [px]
-  double corner_sd =
-      0;  ///< of where the worst corner of the picture is projected, for a fixed ray; 100 at most [px]
-  double coverage = 0;  ///< share of the picture within the outline of all corners
-  double tilt = 0;      ///< largest angle between the target's normals of two views [rad]
+  double corner_sd = 0;  ///< of where the worst corner of the picture is projected, for a fixed ray; at most
+                         ///< most_corner_sd [px]
+  double coverage = 0;   ///< share of the picture within the outline of all corners
+  double tilt = 0;       ///< largest angle between the target's normals of two views [rad]
   std::vector<IntrinsicsView> views;
   std::vector<std::string> warnings;  ///< what these pictures do not determine
 };

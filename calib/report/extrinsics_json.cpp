@@ -127,7 +127,7 @@ Json to_json(const NamedTransform& transform) {
 Json to_json(const TargetSize& size) {
   return {{"estimate", size.estimate},
           {"sd", size.sd},
-          {"solved", size.prior_sd > 0},
+          {"solved", size.sd > 0},
           {"prior_sd", std::isfinite(size.prior_sd) ? Json(size.prior_sd) : Json(nullptr)},
           {"wanted", size.wanted ? Json(size.wanted->estimate) : Json(nullptr)},
           {"wanted_sd", size.wanted ? Json(size.wanted->sd) : Json(nullptr)}};
@@ -194,7 +194,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"weakest_deg", kDegrees * calibration.weakest.rotation}};
   json["convention_findings"] = Json::array();
   json["scale"] = calibration.size ? to_json(*calibration.size) : Json(nullptr);
-  if (calibration.size) {
+  if (calibration.size && has_pixels(calibration)) {
     json["scale"]["warp_mm"] = list(Warp(1e3 * calibration.warp.estimate));
     json["scale"]["warp_sd_mm"] = list(Warp(1e3 * calibration.warp.sd));
   }

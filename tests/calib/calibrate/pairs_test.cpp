@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calib/calibrate/calibrate_pairs.h"
 #include "tests/calib/knocked_scene.h"
@@ -139,6 +140,84 @@ TEST(Pairs, ThatMayBeInvertedInThreeWaysAreToldAllOfThem) {
   EXPECT_NE(said.find("(or the poses are T_gripper_base, or those of the target T_target_camera)"),
             std::string::npos)
       << said;
+}
+
+/// Robot and camera as they stand, with noise of each.
+HandEyeScene noisy_scene(Mount setup, double robot_mm, double camera_mm, unsigned seed) {
+  SceneSettings settings = protocol_settings(setup);
+  settings.views = 24;
+  settings.robot_mm = robot_mm;
+  settings.robot_deg = 0.02;
+  HandEyeScene scene = make_scene(settings, board_points(), seed);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  for (Observation& pair : scene.observations)
+    for (double& value : pair.T_camera_target.front().translation())
+      value += 1e-3 * camera_mm * normal(random);
+  return scene;
+}
+
+bool tells_of_size(const Calibration& result) {
+  return std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
+    return warning.find("times as large as stated") != std::string::npos;
+  });
+}
+
+TEST(Pairs, OfATargetOfAnotherSizeAreToldItAndSolvedForIt) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const double size : {1.2, 0.9, 1.05}) {
+      const HandEyeScene scene = noisy_scene(setup, 0.5, 0.5, 21);
+      std::vector<Observation> pairs = pairs_of(scene);
+      for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
+      const Calibration stated = calibrate_pairs(setup, pairs);
+      EXPECT_FALSE(stated.usable) << size;
+      EXPECT_EQ(stated.warnings.front().substr(0, 14), "the target is ") << stated.warnings.front();
+      ASSERT_TRUE(stated.size && stated.size->wanted);
+      EXPECT_LT(std::abs(stated.size->wanted->estimate - size), 4 * stated.size->wanted->sd) << size;
+      CalibrateSettings kept;
+      kept.size_as_stated = true;
+      EXPECT_TRUE(calibrate_pairs(setup, pairs, kept).usable) << size;
+      CalibrateSettings unknown;
+      unknown.target_size_sd = std::numeric_limits<double>::infinity();
+      const Calibration solved = calibrate_pairs(setup, pairs, unknown);
+      EXPECT_TRUE(solved.usable) << size;
+      EXPECT_FALSE(tells_of_size(solved)) << size;
+      const Vector6d error = motion_between(solved.poses.X, scene.truth.X);
+      EXPECT_LT(error.dot(solved.covariance.ldlt().solve(error)), 22.5) << size;  // 99.9 % of chi-square, 6
+    }
+}
+
+// Noise of one side alone looks like a size: which of them it is, pairs do not tell.
+TEST(Pairs, WhoseNoiseIsTheCamerasAreAnsweredAndNotCalledTheRobots) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const double camera_mm : {6.0, 10.0, 15.0, 20.0}) {
+      const HandEyeScene scene = noisy_scene(setup, 0.3, camera_mm, 31);
+      const Calibration result = calibrate_pairs(setup, pairs_of(scene));
+      EXPECT_TRUE(result.usable) << camera_mm << ' ' << result.warnings.front();
+      EXPECT_FALSE(tells_of_size(result)) << camera_mm;
+      EXPECT_EQ(result.warnings.front().substr(0, 24), "robot and camera scatter") << result.warnings.front();
+      const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+      EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5) << camera_mm;
+    }
+}
+
+TEST(Pairs, OfARobotThatOnlyTurnsDoNotTellTheSize) {
+  HandEyeScene scene = noisy_scene(Mount::eye_in_hand, 0.5, 0.5, 21);
+  const Eigen::Vector3d place = scene.true_poses.front().translation();
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0, 5e-4);
+  for (std::size_t i = 0; i < scene.observations.size(); ++i) {
+    Eigen::Isometry3d pose = scene.true_poses[i];
+    pose.translation() = place;
+    scene.observations[i].T_base_gripper = pose;
+    scene.observations[i].T_camera_target = {scene.truth.X.inverse() * pose.inverse() * scene.truth.Z};
+    for (double& value : scene.observations[i].T_camera_target.front().translation()) value += normal(random);
+  }
+  CalibrateSettings unknown;
+  unknown.target_size_sd = std::numeric_limits<double>::infinity();
+  const std::string said =
+      data::input_error_of([&] { calibrate_pairs(Mount::eye_in_hand, pairs_of(scene), unknown); });
+  EXPECT_EQ(said.substr(0, 48), "the data do not tell the size of the target: the") << said;
 }
 
 }  // namespace
