@@ -119,7 +119,7 @@ TargetSize settle_size(std::vector<PoseLoop>& loops, const std::vector<Eigen::Ve
     throw data::InputError(
         "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
         "out, or add views farther apart");
-  if (!settings.target_size_sd || size.prior_sd == 0 || settings.size_as_stated || !size.wanted) return size;
+  if (size.prior_sd == 0 || settings.size_as_stated || !size.wanted) return size;
   // Of what is known and what pairs want, by their deviations.
   const double known = std::isinf(size.prior_sd) ? 0 : std::pow(size.prior_sd, -2),
                seen = std::pow(size.wanted->sd, -2);

@@ -83,6 +83,7 @@ TEST(Pairs, OfAStreamAreComparedOnSomeOfThemAndAllSolved) {
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].T_camera_target = {scene.truth.X.inverse() * scene.true_poses[i].inverse() * scene.truth.Z};
   CalibrateSettings settings;
+  settings.target_size_sd = 0;  // a size that is solved for is less known than places
   std::size_t most = 0;
   settings.closed_forms = {{"park",
                             [&](const std::vector<PoseLoop>& loops) -> std::optional<HandEyePoses> {
@@ -157,6 +158,11 @@ HandEyeScene noisy_scene(Mount setup, double robot_mm, double camera_mm, unsigne
   return scene;
 }
 
+bool within_999(const Calibration& result, const HandEyeScene& scene) {
+  const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+  return error.dot(result.covariance.ldlt().solve(error)) < 22.5;  // 99.9 % of chi-square, 6
+}
+
 bool tells_of_size(const Calibration& result) {
   return std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
     return warning.find("times as large as stated") != std::string::npos;
@@ -170,7 +176,7 @@ TEST(Pairs, OfATargetOfAnotherSizeAreToldItAndSolvedForIt) {
       std::vector<Observation> pairs = pairs_of(scene);
       for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
       const Calibration stated = calibrate_pairs(setup, pairs);
-      EXPECT_FALSE(stated.usable) << size;
+      EXPECT_TRUE(!stated.usable || within_999(stated, scene)) << size;
       EXPECT_EQ(stated.warnings.front().substr(0, 14), "the target is ") << stated.warnings.front();
       ASSERT_TRUE(stated.size && stated.size->wanted);
       EXPECT_LT(std::abs(stated.size->wanted->estimate - size), 4 * stated.size->wanted->sd) << size;
@@ -182,9 +188,22 @@ TEST(Pairs, OfATargetOfAnotherSizeAreToldItAndSolvedForIt) {
       const Calibration solved = calibrate_pairs(setup, pairs, unknown);
       EXPECT_TRUE(solved.usable) << size;
       EXPECT_FALSE(tells_of_size(solved)) << size;
-      const Vector6d error = motion_between(solved.poses.X, scene.truth.X);
-      EXPECT_LT(error.dot(solved.covariance.ldlt().solve(error)), 22.5) << size;  // 99.9 % of chi-square, 6
+      EXPECT_TRUE(within_999(solved, scene)) << size;
     }
+}
+
+// Prints are off by a percent or two.
+TEST(Pairs, OfATargetOfNearlyTheSizeStatedAreAnsweredForTheSizeThatTheyTell) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const double size : {0.98, 0.99, 1.0, 1.01, 1.02})
+      for (const unsigned seed : {21U, 22U, 23U}) {
+        const HandEyeScene scene = noisy_scene(setup, 0.5, 0.5, seed);
+        std::vector<Observation> pairs = pairs_of(scene);
+        for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
+        const Calibration result = calibrate_pairs(setup, pairs);
+        EXPECT_TRUE(result.usable && within_999(result, scene)) << size << ' ' << seed;
+        EXPECT_LT(std::abs(result.size->estimate - size), 4 * result.size->sd) << size << ' ' << seed;
+      }
 }
 
 // Noise of one side alone looks like a size: which of them it is, pairs do not tell.
@@ -196,8 +215,7 @@ TEST(Pairs, WhoseNoiseIsTheCamerasAreAnsweredAndNotCalledTheRobots) {
       EXPECT_TRUE(result.usable) << camera_mm << ' ' << result.warnings.front();
       EXPECT_FALSE(tells_of_size(result)) << camera_mm;
       EXPECT_EQ(result.warnings.front().substr(0, 24), "robot and camera scatter") << result.warnings.front();
-      const Vector6d error = motion_between(result.poses.X, scene.truth.X);
-      EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5) << camera_mm;
+      EXPECT_TRUE(within_999(result, scene)) << camera_mm;
     }
 }
 
