@@ -103,7 +103,7 @@ struct LiveScene::Storage {
   std::atomic<bool> stop = false;
   bool interrupted = false;
   std::vector<std::string> notices;
-  std::vector<std::string> scene_names;  ///< of objects, obstacles and end effectors of the file
+  std::vector<std::string> scene_names;  ///< of obstacles and end effectors of the file
   std::vector<Worlds> worlds;
   std::vector<State> starts;  ///< of the worlds
   std::vector<LiveObject> objects;
@@ -221,8 +221,7 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads)
     for (std::size_t b = 0; b < sheet.bodies.size(); ++b)
       s.objects.push_back(object_of(sheet, b, scene.objects[s.objects.size()].name, w));
   }
-  for (const auto& names :
-       {names_of(scene.objects), names_of(scene.obstacles), names_of(scene.end_effectors)})
+  for (const auto& names : {names_of(scene.obstacles), names_of(scene.end_effectors)})
     s.scene_names.insert(s.scene_names.end(), names.begin(), names.end());
   s.every.resize(static_cast<std::size_t>(environments));
   std::iota(s.every.begin(), s.every.end(), 0);
@@ -249,7 +248,7 @@ void LiveScene::add_end_effector(const EndEffector& effector, const Tensor& pose
   if (effector.name.empty()) throw InputError("name: found \"\", expected a name");
   if (std::find(taken.begin(), taken.end(), effector.name) != taken.end())
     throw InputError("name: found \"" + effector.name +
-                     "\", which the scene or another end effector has, expected a new one");
+                     "\", which an obstacle or another end effector has, expected a new one");
   LiveEffector live;
   live.effector = effector;
   for (Worlds& of_object : s.worlds) live.numbers.push_back(of_object.add(effector, poses));
