@@ -22,7 +22,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
-.PHONY: sanitize-threads configure-test format check-format check-includes tidy
+.PHONY: sanitize-threads python-test configure-test format check-format check-includes tidy
 .PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -190,6 +190,9 @@ cmake --preset $1
 cmake --build --preset $1 -j $(JOBS)
 ctest --preset $1 -j $(JOBS)
 endef
+
+python-test: packages-build packages-test  ## Build the wheel of flash_sim in build/python, install it and run its tests
+	scripts/python-test $(PYTHON)
 
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i

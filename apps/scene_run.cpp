@@ -8,11 +8,11 @@
 
 #include "apps/environment_table.h"
 #include "apps/scene_observer.h"
-#include "apps/scene_worlds.h"
 #include "apps/scene_writer.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "sim/scene_worlds.h"
 
 namespace flash::sim {
 namespace {

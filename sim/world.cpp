@@ -73,6 +73,32 @@ World copy_of(const World& world) {
   return copy;
 }
 
+void add_end_effector(World& world, const EndEffector& effector, std::shared_ptr<const Schedule> plan) {
+  Environment& environment = world.environment;
+  const int frame = static_cast<int>(plan->frames.size()) - 1;
+  world.plan = std::move(plan);
+  if (world.driven)
+    world.driven->extend(world.plan, environment.state.time);
+  else
+    environment.schedule = world.plan;
+  const Hold hold{.name = effector.name,
+                  .frame = frame,
+                  .from = never,
+                  .reach = Reach{.half_extents = effector.half_extents, .threshold = effector.threshold}};
+  for (std::vector<Hold>* holds : {&environment.holds, &world.start_holds}) holds->push_back(hold);
+  world.may_miss.push_back(false);
+  if (effector.collides) {
+    Obstacle box{.shape = Box{.half_extents = effector.half_extents}, .name = effector.name, .frame = frame};
+    if (effector.friction) box.friction.assign(environment.materials.size(), *effector.friction);
+    environment.obstacles.push_back(std::move(box));
+    for (State* state : {&environment.state, &world.start_state})
+      if (state->bristles.rows() > 0)
+        state->bristles.conservativeResizeLike(
+            data::Points::Zero(state->bristles.rows() + state->positions.rows(), 3));
+  }
+  clear_forces(world);
+}
+
 void set_pose(World& world, int frame, const Eigen::Isometry3d& pose, double time_step) {
   if (!world.driven) {
     world.driven.emplace(world.plan, world.environment.state.time, time_step);

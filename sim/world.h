@@ -10,6 +10,7 @@
 #include "sim/newton/solver.h"
 #include "sim/oracle/projective.h"
 #include "sim/scene/driven_schedule.h"
+#include "sim/scene/end_effector.h"
 
 namespace flash::sim {
 
@@ -62,6 +63,10 @@ World make_world(Environment start, const WorldSettings& settings);
 
 /// A copy that shares nothing that changes. With its solver, which goes on bitwise as the other.
 World copy_of(const World& world);
+
+/// Gives the world an end effector, the last of its holds and, where it collides, of its obstacles. It stands
+/// in the last frame of `plan`, which otherwise is the schedule that the world has. Before the first step.
+void add_end_effector(World& world, const EndEffector& effector, std::shared_ptr<const Schedule> plan);
 
 /// The frame will be at `pose` at the end of the next step.
 void set_pose(World& world, int frame, const Eigen::Isometry3d& pose, double time_step);

@@ -12,6 +12,7 @@
 #include "data/trajectory.h"
 #include "sim/environment_checks.h"
 #include "sim/step/body_law.h"
+#include "sim/tensor_entries.h"
 
 namespace flash::sim {
 
@@ -25,26 +26,26 @@ using Shape = std::vector<std::int64_t>;
 static_assert(std::is_standard_layout_v<WorldStatus> && sizeof(WorldStatus) % sizeof(double) == 0);
 constexpr std::int64_t status_columns = sizeof(WorldStatus) / sizeof(double);
 
-std::string name_of(const Shape& shape) {
-  std::string name;
-  for (const std::int64_t length : shape) name += (name.empty() ? "" : " x ") + std::to_string(length);
-  return name.empty() ? "a number" : name;
-}
-
-bool is_dense(const Tensor& numbers) {
-  if (numbers.strides.empty()) return true;
-  if (numbers.strides.size() != numbers.shape.size()) return false;
-  std::int64_t stride = 1;
-  for (std::size_t k = numbers.shape.size(); k-- > 0; stride *= numbers.shape[k])
-    if (numbers.shape[k] != 1 && numbers.strides[k] != stride) return false;
-  return true;
-}
+constexpr double farthest_place = 1e5;  ///< as of files of scenes [m]
 
 [[noreturn]] void refuse(const char* setter, const std::string& what) {
   throw InputError("worlds: " + std::string(setter) + ": " + what);
 }
 
 std::string environment_name(int e) { return "environment " + std::to_string(e); }
+
+void check_end_effector(const EndEffector& effector) {
+  const auto expect = [&](bool met, const char* what) {
+    if (!met) refuse("add", effector.name + ": " + what);
+  };
+  expect(effector.half_extents.allFinite() && effector.half_extents.minCoeff() > 0 &&
+             effector.half_extents.maxCoeff() <= farthest_place,
+         "found a box without a size, expected half extents above 0");
+  expect(std::isfinite(effector.threshold) && effector.threshold >= 0,
+         "found a threshold that is none, expected 0 m or more");
+  expect(!effector.friction || (std::isfinite(*effector.friction) && *effector.friction >= 0),
+         "found a friction that is none, expected 0 or more");
+}
 
 Tensor dense(const double* numbers, Shape shape) { return {.data = numbers, .shape = std::move(shape)}; }
 
@@ -81,31 +82,29 @@ struct Worlds::Storage {
     return environments.numbers();
   }
 
-  /// The numbers that a setter is given, an entry for each environment of `chosen`.
   const double* entries_of(const char* setter, const char* name, std::span<const int> chosen,
                            const Tensor& numbers, const Shape& shape_of_each) const {
-    Shape shape = {std::ssize(chosen)};
-    shape.insert(shape.end(), shape_of_each.begin(), shape_of_each.end());
-    const std::string of = std::string(name) + ": ";
-    if (numbers.device != Device::cpu)
-      refuse(setter, of + "found numbers on a CUDA device, expected the CPU's");
-    if (numbers.type != NumberType::float64) refuse(setter, of + "found float32, expected float64");
-    if (numbers.shape != shape)
-      refuse(setter, of + "found " + name_of(numbers.shape) + " numbers, expected " + name_of(shape));
-    if (!is_dense(numbers)) refuse(setter, of + "found strides with gaps, expected dense numbers");
-    if (numbers.empty() && !chosen.empty())
-      refuse(setter, of + "found no numbers, expected " + name_of(shape));
-    const auto* first = static_cast<const double*>(numbers.data);
-    const std::int64_t each =
-        std::accumulate(shape_of_each.begin(), shape_of_each.end(), std::int64_t{1}, std::multiplies<>());
-    for (std::size_t i = 0; i < chosen.size(); ++i)
-      for (std::int64_t k = 0; k < each; ++k) {
-        const double value = first[static_cast<std::int64_t>(i) * each + k];
-        if (!std::isfinite(value))
-          refuse(setter, of + environment_name(chosen[i]) + ": found " + data::format_short(value) + " at " +
-                             std::to_string(k) + ", expected finite numbers");
-      }
-    return first;
+    return sim::entries_of("worlds: " + std::string(setter) + ": " + name, chosen, numbers, shape_of_each);
+  }
+
+  std::vector<Eigen::Isometry3d> poses_of(const char* setter, std::span<const int> chosen,
+                                          const Tensor& poses) const {
+    constexpr double unit_tolerance = 1e-3;  // as of files of trajectories
+    const double* numbers = entries_of(setter, "poses", chosen, poses, {7});
+    std::vector<Eigen::Isometry3d> all;
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      const Eigen::Map<const Eigen::Matrix<double, 7, 1>> pose(numbers + 7 * i);
+      const auto expect = [&](bool met, const std::string& what) {
+        if (!met) refuse(setter, "poses: " + environment_name(chosen[i]) + ": " + what);
+      };
+      const double length = pose.tail<4>().norm(), farthest = pose.head<3>().cwiseAbs().maxCoeff();
+      expect(std::abs(length - 1) <= unit_tolerance,
+             "found a quaternion of length " + data::format_short(length) + ", expected 1");
+      expect(farthest <= farthest_place, "found " + data::format_short(farthest) + " m, expected at most " +
+                                             data::format_short(farthest_place) + " m");
+      all.push_back(data::from_vector(pose));
+    }
+    return all;
   }
 
   void expect_hold(const char* setter, int hold) const {
@@ -235,28 +234,90 @@ Worlds::Worlds(Worlds&&) noexcept = default;
 
 int Worlds::size() const { return storage_->size(); }
 
+EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses) {
+  Storage& s = *storage_;
+  check_end_effector(effector);
+  const std::vector<Eigen::Isometry3d> at = s.poses_of("add", s.every, poses);
+  const auto frames_of = [](const World& world) { return world.plan ? std::ssize(world.plan->frames) : 0; };
+  for (const int e : s.every) {
+    const World &world = s.at(e), &first = s.at(0);
+    if (world.steps != s.settings.first_step)
+      refuse("add", environment_name(e) + ": found " + std::to_string(world.steps) +
+                        " steps taken, expected an end effector before the first");
+    if (frames_of(world) != frames_of(first) ||
+        world.environment.obstacles.size() != first.environment.obstacles.size())
+      refuse("add", environment_name(e) +
+                        ": found other numbers of frames or obstacles, expected those of environment 0");
+  }
+  EndEffectorNumbers numbers{.frame = 0, .hold = static_cast<int>(s.holds++), .obstacle = -1};
+  if (effector.collides) numbers.obstacle = static_cast<int>(s.obstacles++);
+  std::shared_ptr<const Schedule> before, after;
+  for (const int e : s.every) {
+    World& world = s.at(e);
+    const Eigen::Isometry3d& pose = at[static_cast<std::size_t>(e)];
+    // Environments that share a schedule and start alike share the longer one too.
+    if (!after || world.plan != before || after->frames.back().front().matrix() != pose.matrix()) {
+      before = world.plan;
+      Schedule longer = before ? *before : Schedule{.time_step = s.time_step(), .frames = {}};
+      numbers.frame = static_cast<int>(longer.frames.size());
+      longer.frames.push_back({pose});
+      after = std::make_shared<const Schedule>(std::move(longer));
+    }
+    add_end_effector(world, effector, after);
+  }
+  s.hold_forces.assign(s.worlds.size() * 3 * static_cast<std::size_t>(s.holds), 0.0);
+  s.obstacle_forces.assign(s.worlds.size() * 3 * static_cast<std::size_t>(s.obstacles), 0.0);
+  return numbers;
+}
+
 void Worlds::set_poses(const Chosen& environments, int frame, const Tensor& poses) {
-  constexpr double unit_tolerance = 1e-3;  // as of files of trajectories
   Storage& s = *storage_;
   const std::span<const int> chosen = s.numbers_of("set_poses", environments);
-  const double* numbers = s.entries_of("set_poses", "poses", chosen, poses, {7});
-  const auto pose_of = [&](std::size_t i) {
-    return Eigen::Map<const Eigen::Matrix<double, 7, 1>>(numbers + 7 * i);
-  };
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const int e = chosen[i];
+  for (const int e : chosen) {
     const World& world = s.at(e);
     const std::ptrdiff_t frames = world.plan ? std::ssize(world.plan->frames) : 0;
     if (frame < 0 || frame >= frames)
       refuse("set_poses", environment_name(e) + ": found frame " + std::to_string(frame) +
                               ", expected one of the " + std::to_string(frames) + " of its schedule");
-    const double length = pose_of(i).tail<4>().norm();
-    if (!(std::abs(length - 1) <= unit_tolerance))
-      refuse("set_poses", environment_name(e) + ": found a quaternion of length " +
-                              data::format_short(length) + ", expected 1");
   }
+  const std::vector<Eigen::Isometry3d> at = s.poses_of("set_poses", chosen, poses);
+  for (std::size_t i = 0; i < chosen.size(); ++i) set_pose(s.at(chosen[i]), frame, at[i], s.time_step());
+}
+
+void Worlds::set_gravity(const Chosen& environments, const Tensor& gravity) {
+  Storage& s = *storage_;
+  const std::span<const int> chosen = s.numbers_of("set_gravity", environments);
+  const double* numbers = s.entries_of("set_gravity", "gravity", chosen, gravity, {3});
   for (std::size_t i = 0; i < chosen.size(); ++i)
-    set_pose(s.at(chosen[i]), frame, data::from_vector(pose_of(i)), s.time_step());
+    s.at(chosen[i]).environment.gravity = Eigen::Map<const Eigen::Vector3d>(numbers + 3 * i);
+}
+
+void Worlds::set_friction(const Chosen& environments, int obstacle, std::span<const double> friction,
+                          int body) {
+  Storage& s = *storage_;
+  const char* setter = "set_friction";
+  const std::span<const int> chosen = s.numbers_of(setter, environments);
+  if (friction.size() != chosen.size())
+    refuse(setter, "found " + std::to_string(friction.size()) + " coefficients, expected " +
+                       std::to_string(chosen.size()));
+  if (body < 0 || body >= std::ssize(s.plan->bodies))
+    refuse(setter, "found body " + std::to_string(body) + ", expected one of " +
+                       std::to_string(s.plan->bodies.size()));
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const std::ptrdiff_t obstacles = std::ssize(s.at(chosen[i]).environment.obstacles);
+    if (obstacle < 0 || obstacle >= obstacles)
+      refuse(setter, environment_name(chosen[i]) + ": found obstacle " + std::to_string(obstacle) +
+                         ", expected one of " + std::to_string(obstacles));
+    if (!(friction[i] >= 0 && std::isfinite(friction[i])))
+      refuse(setter, environment_name(chosen[i]) + ": found " + data::format_short(friction[i]) +
+                         ", expected a number of 0 or more");
+  }
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    std::vector<double>& all =
+        s.at(chosen[i]).environment.obstacles[static_cast<std::size_t>(obstacle)].friction;
+    all.resize(std::max(all.size(), static_cast<std::size_t>(body) + 1), -1.0);
+    all[static_cast<std::size_t>(body)] = friction[i];
+  }
 }
 
 void Worlds::set_materials(const Chosen& environments, std::span<const data::SheetMaterial> materials,

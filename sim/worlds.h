@@ -73,6 +73,11 @@ class Worlds {
 
   int size() const;
 
+  /// Gives every environment an end effector, open, at its pose: environments x 7. The tensors of forces are
+  /// others from then on. Throws data::InputError where a step has been taken, where the environments differ
+  /// in the number of their frames or obstacles, and for what is no size, threshold or friction.
+  EndEffectorNumbers add(const EndEffector& effector, const Tensor& poses);
+
   /// Where a frame of the schedule is at the end of the next step: environments x 7. It stays there until it
   /// is given another pose. Throws data::InputError.
   void set_poses(const Chosen& environments, int frame, const Tensor& poses);
@@ -83,6 +88,12 @@ class Worlds {
                      int body = 0);
   void set_materials(const Chosen& environments, std::span<const data::SolidMaterial> materials,
                      int body = 0);
+
+  /// environments x 3 [m/s^2]. Throws data::InputError.
+  void set_gravity(const Chosen& environments, const Tensor& gravity);
+
+  /// Coulomb coefficients of an obstacle on one body, one for each environment. Throws data::InputError.
+  void set_friction(const Chosen& environments, int obstacle, std::span<const double> friction, int body = 0);
 
   /// A hold closes in the next step, on what is where the environment stands then. One that is closed goes on
   /// with what it carries. Throws data::InputError for vertices that are not there, and other vertices than
@@ -106,8 +117,8 @@ class Worlds {
   void step(int count = 1, const std::function<void(int environment)>& seen = {},
             const std::function<void(int environment)>& finished = {});
 
-  // Views that stay where they are as long as the worlds do. What is in them is as it was at the end of the
-  // last `step`.
+  // Views that stay where they are as long as the worlds do, those of forces until an end effector is added.
+  // What is in them is as it was at the end of the last `step`.
   Tensor positions() const;        ///< environments x vertices x 3 [m]
   Tensor velocities() const;       ///< environments x vertices x 3 [m/s]
   Tensor hold_forces() const;      ///< hold on sheet: environments x holds x 3 [N]

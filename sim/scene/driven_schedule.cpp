@@ -17,6 +17,13 @@ void DrivenSchedule::set(int frame, const Eigen::Isometry3d& pose) {
   targets_[static_cast<std::size_t>(frame)] = pose;
 }
 
+void DrivenSchedule::extend(std::shared_ptr<const Schedule> plan, double time) {
+  plan_ = std::move(plan);
+  for (std::size_t f = targets_.size(); f < plan_->frames.size(); ++f)
+    poses_->frames.emplace_back(2, pose_at(*plan_, static_cast<int>(f), time));
+  targets_.resize(plan_->frames.size());
+}
+
 void DrivenSchedule::begin_step(double time) {
   constexpr double rounding =
       5e-7;  // of a time that is a sum of steps, in steps: half of what pose_at allows

@@ -21,6 +21,9 @@ class DrivenSchedule {
   /// The frame will be at `pose` at the end of the next step, and stays there until it is given another.
   void set(int frame, const Eigen::Isometry3d& pose);
 
+  /// Follows `plan`, which has further frames behind those that are there. `time`: where these begin [s].
+  void extend(std::shared_ptr<const Schedule> plan, double time);
+
   /// Goes on to the step that starts at `time` [s].
   void begin_step(double time);
 

@@ -1,4 +1,4 @@
-#include "apps/scene_worlds.h"
+#include "sim/scene_worlds.h"
 
 #include <algorithm>
 #include <utility>
@@ -93,13 +93,15 @@ std::size_t vertices_of(const std::vector<SceneBody>& bodies) {
 }
 
 std::vector<Worlds> scene_worlds(const data::Scene& scene, const std::vector<SceneBody>& bodies,
-                                 int environments, const std::vector<Variation>& variations, int threads) {
+                                 int environments, const std::vector<Variation>& variations, int threads,
+                                 const std::atomic<bool>* stop) {
   check_memory(scene, bodies, environments);
   std::vector<Worlds> worlds;
   try {
     check_variations(bodies, variations);
     WorldSettings settings = settings_of(scene.solver, scene.time_step);
     settings.threads = environments > 1 ? threads : 1;
+    settings.solver.stop = stop;
     for (const SceneBody& body : bodies) {
       check_method(scene.solver, body);
       worlds.push_back(worlds_of(body, environments, variations, settings));
@@ -110,9 +112,10 @@ std::vector<Worlds> scene_worlds(const data::Scene& scene, const std::vector<Sce
   return worlds;
 }
 
-void step(std::vector<Worlds>& worlds, int threads) {
+void step(std::vector<Worlds>& worlds, int threads, int count) {
   const bool alone = worlds.empty() || worlds.front().size() == 1;  // else environments share the threads
-  data::for_each_in_parallel(worlds.size(), alone ? threads : 1, [&](std::size_t b) { worlds[b].step(); });
+  data::for_each_in_parallel(worlds.size(), alone ? threads : 1,
+                             [&](std::size_t b) { worlds[b].step(count); });
 }
 
 double stop_motion(std::vector<Worlds>& worlds) {

@@ -1,4 +1,6 @@
 #pragma once
+#include <atomic>
+#include <cstddef>
 #include <vector>
 
 #include "data/scene.h"
@@ -11,11 +13,13 @@ namespace flash::sim {
 /// The worlds of each object of a scene: `environments` of each, of which 0 is the object itself and the
 /// others differ by `variations`. Throws data::InputError, naming the file, for an object that the scene's
 /// method cannot step, what a variation does not find in any object, and where there is too little memory.
+/// `stop`: as SolverSettings has it.
 std::vector<Worlds> scene_worlds(const data::Scene& scene, const std::vector<SceneBody>& bodies,
-                                 int environments, const std::vector<Variation>& variations, int threads);
+                                 int environments, const std::vector<Variation>& variations, int threads,
+                                 const std::atomic<bool>* stop = nullptr);
 
-/// Takes one step of all of them, on up to `threads` threads.
-void step(std::vector<Worlds>& worlds, int threads);
+/// Takes `count` steps of all of them, on up to `threads` threads.
+void step(std::vector<Worlds>& worlds, int threads, int count = 1);
 
 /// Takes away all velocity of all environments; returns the largest there was [m/s].
 double stop_motion(std::vector<Worlds>& worlds);

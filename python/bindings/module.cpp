@@ -1,0 +1,50 @@
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+
+#include <exception>
+#include <string>
+
+#include "data/asset.h"
+#include "data/error.h"
+#include "data/scene.h"
+#include "python/bindings/simulation.h"
+
+namespace flash::python {
+
+namespace nb = nanobind;
+
+namespace {
+
+/// Bad input is a ValueError with the same line.
+void raise_input_errors() {
+  nb::register_exception_translator([](const std::exception_ptr& error, void*) {
+    try {
+      std::rethrow_exception(error);
+    } catch (const data::InputError& bad) {
+      PyErr_SetString(PyExc_ValueError, bad.what());
+    }
+  });
+}
+
+void bind_scene(nb::module_& module) {
+  nb::class_<data::Scene>(module, "Scene")
+      .def_prop_ro("name", [](const data::Scene& scene) { return scene.name; })
+      .def_prop_ro("assets", [](const data::Scene& scene) {
+        nb::dict assets;
+        for (const data::SceneObject& object : scene.objects) assets[object.name.c_str()] = object.asset;
+        return assets;
+      });
+  module.def("load_scene", &data::load_scene);
+  module.def("check_asset", [](const std::string& path) { data::load_asset(path); });
+}
+
+}  // namespace
+
+}  // namespace flash::python
+
+NB_MODULE(_core, module) {
+  module.attr("__version__") = FLASH_VERSION;
+  flash::python::raise_input_errors();
+  flash::python::bind_scene(module);
+  flash::python::bind_simulation(module);
+}

@@ -1,0 +1,181 @@
+#include "python/bindings/simulation.h"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <chrono>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/error.h"
+#include "python/bindings/arrays.h"
+
+namespace flash::python {
+
+namespace nb = nanobind;
+using namespace std::chrono_literals;
+
+namespace {
+
+using Environments = std::vector<int>;  ///< by their numbers
+
+/// Environments as they stood.
+struct SavedState {
+  std::shared_ptr<const sim::LiveScene::Saved> saved;
+};
+
+std::vector<sim::Tensor> tensors_of(const std::vector<std::optional<Numbers>>& arrays) {
+  std::vector<sim::Tensor> tensors;
+  for (const std::optional<Numbers>& array : arrays)
+    tensors.push_back(array ? tensor_of(*array) : sim::Tensor());
+  return tensors;
+}
+
+nb::ndarray<nb::numpy, int> triangles_of(const sim::LiveObject& object) {
+  auto* numbers = new std::vector<int>(static_cast<std::size_t>(object.triangles.size()));
+  const nb::capsule owner(numbers, [](void* kept) noexcept { delete static_cast<std::vector<int>*>(kept); });
+  for (Eigen::Index t = 0; t < object.triangles.rows(); ++t)
+    for (Eigen::Index k = 0; k < 3; ++k)
+      (*numbers)[static_cast<std::size_t>(3 * t + k)] = object.triangles(t, k);
+  return {numbers->data(), {static_cast<std::size_t>(object.triangles.rows()), 3}, owner};
+}
+
+}  // namespace
+
+void Simulation::step(int count) {
+  use([&](sim::LiveScene& live) {
+    // In a thread of its own, so that this one can see signals. That costs some 20 microseconds.
+    std::future<void> steps = std::async(std::launch::async, [&] { live.step(count); });
+    const auto ended = [&](std::chrono::milliseconds time) {
+      const nb::gil_scoped_release release;
+      return steps.wait_for(time) == std::future_status::ready;
+    };
+    while (!ended(20ms)) {
+      if (PyErr_CheckSignals() == 0) continue;
+      const nb::python_error signal;
+      do live.stop();
+      while (!ended(1ms));
+      try {
+        steps.get();
+      } catch (const data::Stopped&) {
+      }
+      throw signal;
+    }
+    steps.get();
+  });
+}
+
+void bind_simulation(nb::module_& module) {
+  using sim::LiveScene;
+  nb::class_<SavedState>(module, "State",
+                         "Environments as they stood. What it holds load_state alone reads.");
+
+  nb::class_<Simulation> simulation(module, "Simulation");
+  simulation.def(nb::init<const data::Scene&, int, int>());
+  simulation.def("step", &Simulation::step);
+
+  // What it is made of.
+  simulation.def("time_step",
+                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.time_step(); }); });
+  simulation.def("notices",
+                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.notices(); }); });
+  simulation.def("obstacles",
+                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.obstacles(); }); });
+  simulation.def("end_effectors",
+                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.end_effectors(); }); });
+  simulation.def("objects", [](Simulation& s) {
+    return s.use([](LiveScene& live) {
+      nb::dict objects;
+      for (const sim::LiveObject& object : live.objects())
+        objects[object.name.c_str()] = triangles_of(object);
+      return objects;
+    });
+  });
+
+  // End effectors.
+  simulation.def("add_end_effector", [](Simulation& s, const std::string& name, const Numbers& poses,
+                                        const std::array<double, 3>& size, double reach, bool collides,
+                                        std::optional<double> friction) {
+    const sim::EndEffector effector{.name = name,
+                                    .half_extents = 0.5 * Eigen::Vector3d(size[0], size[1], size[2]),
+                                    .threshold = reach,
+                                    .collides = collides,
+                                    .friction = friction};
+    s.use([&](LiveScene& live) { live.add_end_effector(effector, tensor_of(poses)); });
+  });
+  simulation.def("move_end_effector", [](Simulation& s, const std::string& name,
+                                         const Environments& environments, const Numbers& poses) {
+    s.use([&](LiveScene& live) { live.move_end_effector(name, environments, tensor_of(poses)); });
+  });
+  simulation.def("grasp", [](Simulation& s, const std::string& name, const std::vector<int>& closing,
+                             const std::vector<int>& opening) {
+    s.use([&](LiveScene& live) {
+      live.close(name, closing);
+      live.open(name, opening);
+    });
+  });
+  simulation.def("held", [](Simulation& s, const std::string& name) {
+    return s.use([&](LiveScene& live) { return live.held(name); });
+  });
+
+  // State.
+  const auto def_view = [&](const char* name, sim::Tensor (LiveScene::*view)(const std::string&) const) {
+    simulation.def(name, [view](Simulation& s, const std::string& of) {
+      return s.use([&](LiveScene& live) { return view_of((live.*view)(of), s.shared()); });
+    });
+  };
+  def_view("positions", &LiveScene::positions);
+  def_view("velocities", &LiveScene::velocities);
+  def_view("force", &LiveScene::force);
+  def_view("pose", &LiveScene::pose);
+  simulation.def("status", [](Simulation& s) {
+    return s.use([&](LiveScene& live) { return view_of(live.status(), s.shared()); });
+  });
+  simulation.def("why_lost", [](Simulation& s) {
+    return s.use([](LiveScene& live) {
+      std::vector<std::string> reasons;
+      for (int e = 0; e < live.size(); ++e) reasons.push_back(live.why_lost(e));
+      return reasons;
+    });
+  });
+  simulation.def("reset", [](Simulation& s, const Environments& environments,
+                             const std::vector<std::optional<Numbers>>& positions,
+                             const std::vector<std::optional<Numbers>>& velocities) {
+    s.use([&](LiveScene& live) { live.reset(environments, tensors_of(positions), tensors_of(velocities)); });
+  });
+  simulation.def("set_velocities", [](Simulation& s, const std::string& object,
+                                      const Environments& environments, const Numbers& velocities) {
+    s.use([&](LiveScene& live) { live.set_velocities(object, environments, tensor_of(velocities)); });
+  });
+  simulation.def("save", [](Simulation& s, const Environments& environments) {
+    return s.use([&](LiveScene& live) { return SavedState{live.save(environments)}; });
+  });
+  simulation.def("load", [](Simulation& s, const Environments& environments, const SavedState& state) {
+    s.use([&](LiveScene& live) { live.load(environments, *state.saved); });
+  });
+
+  // What may differ between environments.
+  simulation.def("material", [](Simulation& s, const std::string& object) {
+    return s.use([&](LiveScene& live) { return live.material(object); });
+  });
+  simulation.def("set_material", [](Simulation& s, const std::string& object,
+                                    const Environments& environments, const sim::MaterialNumbers& numbers) {
+    s.use([&](LiveScene& live) { live.set_material(object, environments, numbers); });
+  });
+  simulation.def("set_friction", [](Simulation& s, const std::string& object, const std::string& obstacle,
+                                    const Environments& environments, const std::vector<double>& friction) {
+    s.use([&](LiveScene& live) { live.set_friction(object, obstacle, environments, friction); });
+  });
+  simulation.def("set_gravity", [](Simulation& s, const Environments& environments, const Numbers& gravity) {
+    s.use([&](LiveScene& live) { live.set_gravity(environments, tensor_of(gravity)); });
+  });
+}
+
+}  // namespace flash::python

@@ -1,0 +1,342 @@
+"""A scene in many environments, driven step by step."""
+import os
+
+import numpy as np
+
+from flash_sim import _core, arguments
+from flash_sim.asset import Asset
+
+STATUS = np.dtype([(name, np.float64) for name in
+                   ("steps", "time", "converged", "residual", "penetration", "parts", "lost")])
+PUBLISHED_RANGE = (0.5, 1.5)  # factors on what an asset has
+
+
+class RealtimeSim:
+    """A scene in `n_envs` environments that stay alive.
+
+        sim = flash_sim.RealtimeSim(); sim.load_config("scene.json"); sim.set_envs(n_envs=128); sim.initialize()
+        sim.add_ee("left", start_pose, size=[0.05] * 3)
+        for _ in range(1000):
+            sim.move_ee("left", pose); sim.grasp_ee("left", grasp)
+            sim.step()
+
+    Units are SI. A pose is x y z qx qy qz qw, of the end effector in the frame of the scene. Numbers may be given as float32
+    or integers and are converted to float64. `env_ids` are numbers of environments, or a mask of n_envs bools; None means all.
+    What is given holds from the next step on.
+
+    positions, velocities, force and status are live: read-only views on the memory of the simulation, which show the
+    end of the last step. Copy what has to stay. After another initialize() an old view keeps its last numbers.
+
+    A refused argument raises ValueError or TypeError with its name, what was found and what was expected, and changes
+    nothing. An environment whose step fails is lost: status()["lost"] is not 0, the others go on, and reset brings it back.
+    """
+
+    def __init__(self, device="auto", seed=0, threads=0):
+        """device: "auto" or "cpu"; this package steps on the processor alone. threads: 0 takes one per processor."""
+        if arguments.text("device", device) not in ("auto", "cpu"):
+            raise ValueError(f"device: found {device!r}, expected 'auto' or 'cpu': this package has no other device yet")
+        self._threads = arguments.whole_number("threads", threads, 0, 1024)
+        self._scene = self._simulation = None
+        self._n_envs = 1
+        self.seed(seed)
+
+    # -- setting up -----------------------------------------------------------------------------------------------------
+
+    def load_config(self, path):
+        """Reads a scene file: the published format, or flash-scene/1. It holds from the next initialize() on."""
+        try:
+            self._scene = _core.load_scene(os.fspath(path))
+        except TypeError:
+            raise TypeError(f"load_config: path: found {path!r:.60}, expected the path of a scene file") from None
+
+    def set_envs(self, n_envs):
+        """How many environments the next initialize() makes."""
+        self._n_envs = arguments.whole_number("set_envs: n_envs", n_envs, 1, 1_000_000)
+
+    def initialize(self):
+        """Makes the environments, all at the start of the scene. End effectors are added anew after it."""
+        if self._scene is None:
+            raise RuntimeError("initialize: found no scene, expected load_config(path) before")
+        self._simulation = _core.Simulation(self._scene, self._n_envs, self._threads)
+        self._initialized_envs = self._n_envs
+        self._triangles = self._simulation.objects()
+        self._assets = self._scene.assets
+        self._start_materials = {body: self.material(body) for body in self._triangles}
+
+    def add_ee(self, name, start_pose, size=(0.05, 0.05, 0.05), reach=0.01, friction=None, collides=True):
+        """Adds an open end effector to every environment, before the first step.
+
+        start_pose: (7,), (n_envs, 7), or (3,), (n_envs, 3) without a turn. size: edges of its box [m]. The box is an
+        obstacle that moves, with a Coulomb coefficient `friction`, or that of each material; `collides=False` lets it pass
+        through. When it closes it holds all vertices within `reach` [m] of the box.
+        """
+        simulation = self._ready("add_ee")
+        no_turn = np.tile([0.0, 0, 0, 0, 0, 0, 1], (self.n_envs, 1))
+        simulation.add_end_effector(
+            self._new_name("add_ee: name", name), arguments.poses("add_ee: start_pose", start_pose, no_turn),
+            self._above("add_ee: size", size, (3,), 0, equal=False).tolist(),
+            float(self._above("add_ee: reach", reach, (), 0, equal=True)), bool(collides),
+            None if friction is None else float(self._above("add_ee: friction", friction, (), 0, equal=True)))
+
+    # -- driving --------------------------------------------------------------------------------------------------------
+
+    def move_ee(self, name, pose, env_ids=None):
+        """Where an end effector is at the end of the next step, and stays: (7,) or (n, 7); (3,), (n, 3) keep the turn."""
+        simulation = self._ready("move_ee")
+        self._effector("move_ee: name", name)
+        ids = self._ids("move_ee", env_ids)
+        simulation.move_end_effector(name, ids, arguments.poses("move_ee: pose", pose, simulation.pose(name)[ids]))
+
+    def grasp_ee(self, name, grasp, env_ids=None):
+        """Whether an end effector is closed: bool, or (n,) bool.
+
+        Where it closes, the next step begins by taking the vertices that are within reach then. A closed one takes no
+        more: open it first. held() says how many it has.
+        """
+        simulation = self._ready("grasp_ee")
+        self._effector("grasp_ee: name", name)
+        ids = self._ids("grasp_ee", env_ids)
+        closed = arguments.truths("grasp_ee: grasp", grasp, len(ids))
+        simulation.grasp(name, [e for e, c in zip(ids, closed) if c], [e for e, c in zip(ids, closed) if not c])
+
+    def step(self, count=1):
+        """Takes `count` steps of all environments. Other threads of Python run meanwhile.
+
+        Ctrl-C ends it within a step. After that all environments have to be reset or loaded before the next step.
+        """
+        simulation = self._ready("step")
+        simulation.step(arguments.whole_number("step: count", count, 0))
+
+    # -- state ----------------------------------------------------------------------------------------------------------
+
+    def positions(self, body=None):
+        """Live (n_envs, vertices, 3) [m], in the order of the mesh. A scene of one body needs no name."""
+        simulation = self._ready("positions")
+        return simulation.positions(self._body("positions: body", body))
+
+    def velocities(self, body=None):
+        """Live (n_envs, vertices, 3) [m/s]."""
+        simulation = self._ready("velocities")
+        return simulation.velocities(self._body("velocities: body", body))
+
+    def force(self, ee):
+        """Live (n_envs, 3) [N]: of an end effector on the bodies, by its hold and its surface. A wrist feels the negative."""
+        simulation = self._ready("force")
+        return simulation.force(self._effector("force: ee", ee))
+
+    def pose(self, ee):
+        """Live (n_envs, 7): where an end effector has been told to be."""
+        simulation = self._ready("pose")
+        return simulation.pose(self._effector("pose: ee", ee))
+
+    def held(self, ee):
+        """(n_envs,) int: how many vertices an end effector carries."""
+        simulation = self._ready("held")
+        return np.array(simulation.held(self._effector("held: ee", ee)), int)
+
+    def status(self):
+        """Live (n_envs,) of named numbers: steps, time [s], converged, residual, penetration [m], parts, lost.
+
+        converged: 0 where a step is not solved to the tolerance of the scene. lost: not 0 where an environment goes no
+        further, and why_lost() says why.
+        """
+        return self._ready("status").status().view(STATUS)[:, 0]
+
+    def why_lost(self):
+        """A line for each environment; empty where it is not lost."""
+        return self._ready("why_lost").why_lost()
+
+    def reset(self, env_ids=None, positions=None, velocities=None):
+        """Back to the start of the scene: state and end effectors, but not materials, friction and gravity.
+
+        positions, velocities: (n, vertices, 3) of the environments chosen, or a dict of them by body. A body that is given
+        positions alone starts without velocity. Nothing is held.
+        """
+        simulation = self._ready("reset")
+        ids = self._ids("reset", env_ids)
+        simulation.reset(ids, self._by_body("reset: positions", positions, ids),
+                         self._by_body("reset: velocities", velocities, ids))
+
+    def set_velocities(self, body, velocities, env_ids=None):
+        """(n, vertices, 3) or (vertices, 3) [m/s]."""
+        simulation = self._ready("set_velocities")
+        body = self._body("set_velocities: body", body)
+        ids = self._ids("set_velocities", env_ids)
+        simulation.set_velocities(body, ids, self._rows("set_velocities: velocities", body, velocities, ids))
+
+    def save_state(self, env_ids=None):
+        """The environments as they stand, solvers included: what is loaded goes on bitwise as this does."""
+        simulation = self._ready("save_state")
+        return simulation.save(self._ids("save_state", env_ids))
+
+    def load_state(self, state, env_ids=None):
+        """The i-th environment that was saved goes to the i-th of `env_ids`."""
+        simulation = self._ready("load_state")
+        if not isinstance(state, _core.State):
+            raise TypeError(f"load_state: state: found {type(state).__name__}, expected what save_state gave")
+        simulation.load(self._ids("load_state", env_ids), state)
+
+    # -- what differs between environments --------------------------------------------------------------------------------
+
+    def material(self, body=None):
+        """The numbers of a body's material by name, (n_envs,) each.
+
+        Of a sheet: membrane_stiffness = E t [N/m], poissons_ratio, areal_density [kg/m^2], bending_rigidity D [N m],
+        friction, air_drag [1/s], stiffness_damping [s], yield_curvature [1/m]. Of a solid: youngs_modulus [Pa],
+        poissons_ratio, density [kg/m^3], friction, air_drag, stiffness_damping.
+        """
+        simulation = self._ready("material")
+        return {name: np.array(values) for name, values in simulation.material(self._body("material: body", body))}
+
+    def set_material(self, body=None, env_ids=None, **values):
+        """Sets numbers of material(body): one number, or (n,). Energy that a material stores jumps with it.
+
+        `friction` holds against what states no coefficient of its own; set_friction sets the others.
+        """
+        simulation = self._ready("set_material")
+        body = self._body("set_material: body", body)
+        ids = self._ids("set_material", env_ids)
+        known = [name for name, _ in simulation.material(body)]
+        simulation.set_material(body, ids, [
+            (arguments.one_of("set_material", name, known), arguments.per_environment(f"set_material: {name}", value, len(ids)))
+            for name, value in values.items()])
+
+    def set_friction(self, body, obstacle, friction, env_ids=None):
+        """The Coulomb coefficient of a body on an obstacle or an end effector: one number, or (n,)."""
+        simulation = self._ready("set_friction")
+        body = self._body("set_friction: body", body)
+        arguments.one_of("set_friction: obstacle", obstacle, simulation.obstacles())
+        ids = self._ids("set_friction", env_ids)
+        simulation.set_friction(body, obstacle, ids,
+                                arguments.per_environment("set_friction: friction", friction, len(ids)))
+
+    def set_gravity(self, gravity, env_ids=None):
+        """(3,) or (n, 3) [m/s^2]."""
+        simulation = self._ready("set_gravity")
+        ids = self._ids("set_gravity", env_ids)
+        given = arguments.numbers("set_gravity: gravity", gravity, (3,), (len(ids), 3))
+        simulation.set_gravity(ids, np.array(np.broadcast_to(given, (len(ids), 3))))
+
+    def seed(self, seed):
+        """Of what randomize draws. A simulation itself has no chance in it."""
+        self._random = np.random.default_rng(arguments.whole_number("seed", seed, 0, 2**63 - 1))
+
+    def randomize(self, how, seed=None, env_ids=None):
+        """Materials of all bodies, drawn for each environment. Returns what was set, by body and name.
+
+        "identified": draws of the posterior of each tuned asset, see Asset.draws. "published": what the asset has times
+        factors of 0.5 to 1.5, even and independent, for stiffness, bending, density and friction. "none": what the asset has.
+        """
+        simulation = self._ready("randomize")
+        arguments.one_of("randomize: how", how, ("identified", "published", "none"))
+        ids = self._ids("randomize", env_ids)
+        random = self._random if seed is None else np.random.default_rng(
+            arguments.whole_number("randomize: seed", seed, 0, 2**63 - 1))
+        drawn = {}
+        for body in self.bodies:
+            start = {name: np.full(len(ids), values[0]) for name, values in self._start_materials[body].items()}
+            drawn[body] = start | _drawn(how, self.asset(body), start, random)
+        for body, values in drawn.items():
+            simulation.set_material(body, ids, list(values.items()))
+        return drawn
+
+    # -- what it is made of -----------------------------------------------------------------------------------------------
+
+    @property
+    def n_envs(self):
+        self._ready("n_envs")
+        return self._initialized_envs
+
+    @property
+    def time_step(self):
+        """[s]"""
+        return self._ready("time_step").time_step()
+
+    @property
+    def bodies(self):
+        """Names of the objects of the scene."""
+        self._ready("bodies")
+        return list(self._triangles)
+
+    @property
+    def end_effectors(self):
+        """Names of those that were added."""
+        return self._ready("end_effectors").end_effectors()
+
+    @property
+    def obstacles(self):
+        """Names of what bodies collide with."""
+        return self._ready("obstacles").obstacles()
+
+    @property
+    def notices(self):
+        """What was understood of the scene and its assets, a line each."""
+        return self._ready("notices").notices()
+
+    def triangles(self, body=None):
+        """(triangles, 3) int: the visible triangles by the body's vertices."""
+        self._ready("triangles")
+        return self._triangles[self._body("triangles: body", body)]
+
+    def asset(self, body=None):
+        """The Asset that a body was made of."""
+        self._ready("asset")
+        return Asset(self._assets[self._body("asset: body", body)])
+
+    # -- arguments --------------------------------------------------------------------------------------------------------
+
+    def _ready(self, call):
+        if self._simulation is None:
+            raise RuntimeError(f"{call}: found a simulation that is not initialized, expected initialize() before")
+        return self._simulation
+
+    def _ids(self, call, env_ids):
+        return arguments.environments(f"{call}: env_ids", env_ids, self._initialized_envs)
+
+    def _body(self, what, body):
+        if body is None and len(self._triangles) == 1:
+            return next(iter(self._triangles))
+        return arguments.one_of(what, body, list(self._triangles))
+
+    def _effector(self, what, name):
+        return arguments.one_of(what, name, self._simulation.end_effectors())
+
+    def _new_name(self, what, name):
+        if not arguments.text(what, name) or name in self._simulation.end_effectors():
+            raise ValueError(f"{what}: found {name!r}, expected a name that no other end effector has")
+        return name
+
+    def _above(self, what, value, shape, low, equal):
+        array = arguments.numbers(what, value, shape)
+        if not (array >= low if equal else array > low).all():
+            raise ValueError(f"{what}: found {array.min():.6g}, expected {'' if equal else 'above '}{low}"
+                             f"{' or more' if equal else ''}")
+        return array
+
+    def _rows(self, what, body, value, ids):
+        vertices = self._simulation.positions(body).shape[1]
+        given = arguments.numbers(what, value, (len(ids), vertices, 3), (vertices, 3))
+        return np.ascontiguousarray(np.broadcast_to(given, (len(ids), vertices, 3)))
+
+    def _by_body(self, what, given, ids):
+        """An array or None for each body."""
+        if given is None:
+            return []
+        if not isinstance(given, dict):
+            given = {self._body(f"{what} without a name of a body", None): given}
+        for body in given:
+            self._body(what, body)
+        return [self._rows(f"{what}: {body}", body, given[body], ids) if body in given else None
+                for body in self._triangles]
+
+
+def _drawn(how, asset, start, random):
+    count = len(start["friction"])
+    if how == "none":
+        return {}
+    if how == "published":
+        names = [name for name in ("membrane_stiffness", "youngs_modulus", "bending_rigidity", "areal_density", "density",
+                                   "friction") if name in start]
+        return {name: start[name] * random.uniform(*PUBLISHED_RANGE, count) for name in names}
+    draws = asset.draws(count, int(random.integers(2**63)))
+    return {name: values for name, values in asset.as_material(draws).items() if name in start}

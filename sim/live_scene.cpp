@@ -1,0 +1,499 @@
+#include "sim/live_scene.h"
+
+#include <algorithm>
+#include <deque>
+#include <limits>
+#include <numeric>
+
+#include "data/error.h"
+#include "data/worst.h"
+#include "sim/scene/material_values.h"
+#include "sim/scene/scene.h"
+#include "sim/scene_worlds.h"
+#include "sim/tensor_entries.h"
+
+namespace flash::sim {
+
+using data::InputError;
+using data::Points;
+
+namespace {
+
+struct LiveEffector {
+  EndEffector effector;
+  std::vector<EndEffectorNumbers> numbers;  ///< in each of the worlds
+  std::vector<double> start_poses, poses;   ///< environments x 7
+  std::vector<double> forces;               ///< environments x 3 [N]
+  std::vector<bool> closed;                 ///< by environment
+};
+
+Tensor dense(const std::vector<double>& numbers, std::vector<std::int64_t> shape) {
+  return {.data = numbers.data(), .shape = std::move(shape)};
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list.empty() ? "no name, as there is none" : "one of " + list;
+}
+
+/// Number of what has a name among those that are there.
+std::size_t number_of(const char* what, const std::string& name, const std::vector<std::string>& names) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError(std::string(what) + ": found \"" + name + "\", expected " + listed(names));
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+template <class Things>
+std::vector<std::string> names_of(const Things& things) {
+  std::vector<std::string> names;
+  for (const auto& thing : things) names.push_back(thing.name);
+  return names;
+}
+
+LiveObject object_of(const Sheet& sheet, std::size_t body, std::string name, std::size_t worlds) {
+  const Body& part = sheet.bodies[body];
+  return {.name = std::move(name),
+          .triangles = visible_triangles(body_alone(sheet, part)),
+          .is_solid = part.is_solid(),
+          .worlds = worlds,
+          .body = static_cast<int>(body),
+          .first_vertex = part.first_vertex,
+          .vertices = part.vertex_count};
+}
+
+void merge(const WorldStatus& other, WorldStatus& status) {
+  status.converged = std::min(status.converged, other.converged);
+  status.residual = data::worst(status.residual, other.residual);
+  status.penetration = data::worst(status.penetration, other.penetration);
+  status.parts = std::max(status.parts, other.parts);
+  if (status.lost == 0) status.lost = other.lost;
+}
+
+template <class Material, std::size_t count>
+void set_value(const std::array<MaterialValue<Material>, count>& values, const std::string& name,
+               double number, Material& material) {
+  for (const MaterialValue<Material>& known : values)
+    if (known.name == name) {
+      material.*known.value = number;
+      return;
+    }
+  throw InputError(name + ": found a name that is none of its material, expected " +
+                   listed(names_of(values)));
+}
+
+}  // namespace
+
+class LiveScene::Saved {
+ public:
+  struct Effector {
+    std::vector<double> poses;
+    std::vector<bool> closed;
+  };
+  std::vector<Checkpoint> worlds;
+  std::vector<Effector> effectors;
+};
+
+struct LiveScene::Storage {
+  int environments;
+  int threads;
+  double time_step;
+  bool quasistatic;
+  std::atomic<bool> stop = false;
+  bool interrupted = false;
+  std::vector<std::string> notices;
+  std::vector<std::string> scene_names;  ///< of obstacles and end effectors of the file
+  std::vector<Worlds> worlds;
+  std::vector<State> starts;  ///< of the worlds
+  std::vector<LiveObject> objects;
+  std::deque<LiveEffector> effectors;  ///< whose numbers stay where they are
+  std::vector<int> every;
+  std::vector<WorldStatus> status;
+
+  /// The environments that are meant, each once.
+  std::span<const int> chosen_of(const Chosen& chosen) const {
+    if (chosen.all()) return every;
+    std::vector<bool> found(every.size());
+    for (const int e : chosen.numbers()) {
+      if (e < 0 || e >= environments)
+        throw InputError("environments: found " + std::to_string(e) + ", expected 0 to " +
+                         std::to_string(environments - 1));
+      if (found[static_cast<std::size_t>(e)])
+        throw InputError("environments: found " + std::to_string(e) + " twice, expected each once");
+      found[static_cast<std::size_t>(e)] = true;
+    }
+    return chosen.numbers();
+  }
+
+  const LiveObject& object(const std::string& name) const {
+    return objects[number_of("object", name, names_of(objects))];
+  }
+  std::vector<std::string> effector_names() const {
+    std::vector<std::string> names;
+    for (const LiveEffector& live : effectors) names.push_back(live.effector.name);
+    return names;
+  }
+  LiveEffector& effector(const std::string& name) {
+    return effectors[number_of("end effector", name, effector_names())];
+  }
+
+  /// Rows of one object in a view of its worlds.
+  static Tensor rows_of(const LiveObject& object, Tensor all) {
+    const std::int64_t vertices = all.shape[1];
+    all.data = static_cast<const double*>(all.data) + 3 * object.first_vertex;
+    all.shape[1] = object.vertices;
+    all.strides = {3 * vertices, 3, 1};
+    return all;
+  }
+
+  /// What the views show of all objects together.
+  void show() {
+    for (const int e : every) {
+      const auto index = static_cast<std::size_t>(e);
+      status[index] = worlds.front().status(e);
+      for (const Worlds& of_object : worlds) merge(of_object.status(e), status[index]);
+    }
+    for (LiveEffector& live : effectors) {
+      std::fill(live.forces.begin(), live.forces.end(), 0.0);
+      for (std::size_t w = 0; w < worlds.size(); ++w) {
+        add_rows(worlds[w].hold_forces(), live.numbers[w].hold, live.forces);
+        if (live.numbers[w].obstacle >= 0)
+          add_rows(worlds[w].obstacle_forces(), live.numbers[w].obstacle, live.forces);
+      }
+    }
+  }
+
+  /// Adds row `row` of each environment, of 3 numbers.
+  void add_rows(const Tensor& all, int row, std::vector<double>& sum) const {
+    const auto* numbers = static_cast<const double*>(all.data);
+    for (std::size_t e = 0; e < every.size(); ++e)
+      for (std::size_t k = 0; k < 3; ++k)
+        sum[3 * e + k] += numbers[3 * (e * static_cast<std::size_t>(all.shape[1]) + row) + k];
+  }
+
+  bool is_given(const std::vector<Tensor>& given, std::size_t o, std::size_t w) const {
+    return o < given.size() && !given[o].empty() && objects[o].worlds == w;
+  }
+  bool any_given(const std::vector<Tensor>& given, std::size_t w) const {
+    for (std::size_t o = 0; o < objects.size(); ++o)
+      if (is_given(given, o, w)) return true;
+    return false;
+  }
+
+  /// Rows for all vertices of worlds number `w`: of each object those that are given, else those that `keep(
+  /// environment)` points to.
+  template <class Keep>
+  std::vector<double> rows_for(std::size_t w, std::span<const int> chosen, const std::vector<Tensor>& given,
+                               const Keep& keep) const {
+    const std::ptrdiff_t each = 3 * starts[w].positions.rows();
+    std::vector<double> rows;
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      const double* kept = keep(chosen[i]);
+      rows.insert(rows.end(), kept, kept + each);
+      for (std::size_t o = 0; o < objects.size(); ++o) {
+        if (!is_given(given, o, w)) continue;
+        const std::ptrdiff_t count = 3 * objects[o].vertices;
+        const double* from =
+            static_cast<const double*>(given[o].data) + static_cast<std::ptrdiff_t>(i) * count;
+        std::copy(from, from + count, rows.end() - each + 3 * objects[o].first_vertex);
+      }
+    }
+    return rows;
+  }
+};
+
+LiveScene::LiveScene(const data::Scene& scene, int environments, int threads)
+    : storage_(std::make_unique<Storage>()) {
+  if (environments < 1)
+    throw InputError("environments: found " + std::to_string(environments) + ", expected 1 or more");
+  Storage& s = *storage_;
+  s.environments = environments;
+  s.threads = threads;
+  s.time_step = scene.time_step;
+  s.quasistatic = scene.rest_motion.has_value();
+  s.notices = scene.notices;
+  const std::vector<SceneBody> bodies = scene_bodies(scene, scene.steps, s.notices);
+  s.worlds = scene_worlds(scene, bodies, environments, {}, threads, &s.stop);
+  for (std::size_t w = 0; w < bodies.size(); ++w) {
+    s.starts.push_back(bodies[w].environment.state);
+    const Sheet& sheet = bodies[w].sheet;
+    for (std::size_t b = 0; b < sheet.bodies.size(); ++b)
+      s.objects.push_back(object_of(sheet, b, scene.objects[s.objects.size()].name, w));
+  }
+  for (const auto& names : {names_of(scene.obstacles), names_of(scene.end_effectors)})
+    s.scene_names.insert(s.scene_names.end(), names.begin(), names.end());
+  s.every.resize(static_cast<std::size_t>(environments));
+  std::iota(s.every.begin(), s.every.end(), 0);
+  s.status.resize(s.every.size());
+  s.show();
+}
+
+LiveScene::~LiveScene() = default;
+
+int LiveScene::size() const { return storage_->environments; }
+double LiveScene::time_step() const { return storage_->time_step; }
+const std::vector<LiveObject>& LiveScene::objects() const { return storage_->objects; }
+std::vector<std::string> LiveScene::end_effectors() const { return storage_->effector_names(); }
+const std::vector<std::string>& LiveScene::notices() const { return storage_->notices; }
+
+std::vector<std::string> LiveScene::obstacles() const {
+  return names_of(storage_->worlds.front().environment(0).obstacles);
+}
+
+void LiveScene::add_end_effector(const EndEffector& effector, const Tensor& poses) {
+  Storage& s = *storage_;
+  std::vector<std::string> taken = s.effector_names();
+  taken.insert(taken.end(), s.scene_names.begin(), s.scene_names.end());
+  if (effector.name.empty()) throw InputError("name: found \"\", expected a name");
+  if (std::find(taken.begin(), taken.end(), effector.name) != taken.end())
+    throw InputError("name: found \"" + effector.name +
+                     "\", which an obstacle or another end effector has, expected a new one");
+  LiveEffector live;
+  live.effector = effector;
+  for (Worlds& of_object : s.worlds) live.numbers.push_back(of_object.add(effector, poses));
+  const auto* numbers = static_cast<const double*>(poses.data);
+  live.start_poses.assign(numbers, numbers + 7 * s.every.size());
+  live.poses = live.start_poses;
+  live.forces.resize(3 * s.every.size());
+  live.closed.resize(s.every.size());
+  s.effectors.push_back(std::move(live));
+}
+
+void LiveScene::move_end_effector(const std::string& name, const Chosen& environments, const Tensor& poses) {
+  Storage& s = *storage_;
+  LiveEffector& live = s.effector(name);
+  for (std::size_t w = 0; w < s.worlds.size(); ++w)
+    s.worlds[w].set_poses(environments, live.numbers[w].frame, poses);
+  const auto* from = static_cast<const double*>(poses.data);
+  for (const int e : s.chosen_of(environments)) {
+    std::copy(from, from + 7, live.poses.begin() + 7 * e);
+    from += 7;
+  }
+}
+
+void LiveScene::close(const std::string& name, const Chosen& environments) {
+  Storage& s = *storage_;
+  LiveEffector& live = s.effector(name);
+  std::vector<int> closing;
+  for (const int e : s.chosen_of(environments))
+    if (!live.closed[static_cast<std::size_t>(e)]) closing.push_back(e);
+  for (std::size_t w = 0; w < s.worlds.size(); ++w)
+    s.worlds[w].grasp(closing, live.numbers[w].hold, {.may_miss = true});
+  for (const int e : closing) live.closed[static_cast<std::size_t>(e)] = true;
+}
+
+void LiveScene::open(const std::string& name, const Chosen& environments) {
+  Storage& s = *storage_;
+  LiveEffector& live = s.effector(name);
+  for (std::size_t w = 0; w < s.worlds.size(); ++w) s.worlds[w].release(environments, live.numbers[w].hold);
+  for (const int e : s.chosen_of(environments)) live.closed[static_cast<std::size_t>(e)] = false;
+}
+
+std::vector<int> LiveScene::held(const std::string& name) const {
+  const LiveEffector& live = storage_->effector(name);
+  std::vector<int> counts(storage_->every.size());
+  for (std::size_t w = 0; w < storage_->worlds.size(); ++w)
+    for (std::size_t e = 0; e < counts.size(); ++e) {
+      const std::vector<HeldVertices>& held = storage_->worlds[w].environment(static_cast<int>(e)).state.held;
+      const auto hold = static_cast<std::size_t>(live.numbers[w].hold);
+      if (hold < held.size()) counts[e] += static_cast<int>(held[hold].vertices.size());
+    }
+  return counts;
+}
+
+void LiveScene::set_material(const std::string& object, const Chosen& environments,
+                             const MaterialNumbers& numbers) {
+  Storage& s = *storage_;
+  const LiveObject& own = s.object(object);
+  Worlds& worlds = s.worlds[own.worlds];
+  const std::span<const int> chosen = s.chosen_of(environments);
+  for (const auto& [name, values] : numbers)
+    if (values.size() != chosen.size())
+      throw InputError(name + ": found " + std::to_string(values.size()) + " numbers, expected " +
+                       std::to_string(chosen.size()));
+  const auto changed = [&](const auto& values_of, const auto& material_of) {
+    std::vector<std::remove_cvref_t<decltype(material_of(worlds.environment(0)))>> materials;
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      materials.push_back(material_of(worlds.environment(chosen[i])));
+      for (const auto& [name, values] : numbers) set_value(values_of, name, values[i], materials.back());
+    }
+    worlds.set_materials(environments, materials, own.body);
+  };
+  if (own.is_solid)
+    changed(solid_values, [&](const Environment& e) { return e.solids.at(own.body); });
+  else
+    changed(sheet_values,
+            [&](const Environment& e) { return e.materials[static_cast<std::size_t>(own.body)]; });
+}
+
+MaterialNumbers LiveScene::material(const std::string& object) const {
+  const Storage& s = *storage_;
+  const LiveObject& own = s.object(object);
+  MaterialNumbers numbers;
+  const auto add = [&](const auto& values, const auto& material_of) {
+    for (const auto& known : values) {
+      std::vector<double>& column = numbers.emplace_back(known.name, std::vector<double>()).second;
+      for (const int e : s.every)
+        column.push_back(material_of(s.worlds[own.worlds].environment(e)).*known.value);
+    }
+  };
+  if (own.is_solid)
+    add(
+        solid_values, [&](const Environment& e) -> auto& { return e.solids.at(own.body); });
+  else
+    add(
+        sheet_values, [&](const Environment& e) -> auto& {
+          return e.materials[static_cast<std::size_t>(own.body)];
+        });
+  return numbers;
+}
+
+void LiveScene::set_friction(const std::string& object, const std::string& obstacle,
+                             const Chosen& environments, const std::vector<double>& friction) {
+  Storage& s = *storage_;
+  const LiveObject& own = s.object(object);
+  const std::size_t number = number_of("obstacle", obstacle, obstacles());
+  s.worlds[own.worlds].set_friction(environments, static_cast<int>(number), friction, own.body);
+}
+
+void LiveScene::set_gravity(const Chosen& environments, const Tensor& gravity) {
+  for (Worlds& of_object : storage_->worlds) of_object.set_gravity(environments, gravity);
+}
+
+void LiveScene::set_velocities(const std::string& object, const Chosen& environments,
+                               const Tensor& velocities) {
+  Storage& s = *storage_;
+  const std::size_t number = number_of("object", object, names_of(s.objects));
+  const LiveObject& own = s.objects[number];
+  const std::span<const int> chosen = s.chosen_of(environments);
+  entries_of("velocities", chosen, velocities, {own.vertices, 3});
+  std::vector<Tensor> given(s.objects.size());
+  given[number] = velocities;
+  Worlds& worlds = s.worlds[own.worlds];
+  const std::vector<double> rows = s.rows_for(
+      own.worlds, chosen, given, [&](int e) { return worlds.environment(e).state.velocities.data(); });
+  worlds.set_velocities(environments, dense(rows, {std::ssize(chosen), worlds.velocities().shape[1], 3}));
+}
+
+void LiveScene::reset(const Chosen& environments, const std::vector<Tensor>& positions,
+                      const std::vector<Tensor>& velocities) {
+  Storage& s = *storage_;
+  const std::span<const int> chosen = s.chosen_of(environments);
+  for (const auto& [what, given] :
+       {std::pair("positions: ", &positions), std::pair("velocities: ", &velocities)})
+    for (std::size_t o = 0; o < given->size(); ++o)
+      if (!(*given)[o].empty())
+        entries_of(what + s.objects.at(o).name, chosen, (*given)[o], {s.objects[o].vertices, 3});
+  for (std::size_t w = 0; w < s.worlds.size(); ++w) {
+    if (!s.any_given(positions, w) && !s.any_given(velocities, w)) {
+      s.worlds[w].reset(environments);
+      continue;
+    }
+    Points still = s.starts[w].velocities;  // but for objects whose positions are given
+    for (std::size_t o = 0; o < s.objects.size(); ++o)
+      if (s.is_given(positions, o, w))
+        still.middleRows(s.objects[o].first_vertex, s.objects[o].vertices).setZero();
+    const std::vector<double> x =
+        s.rows_for(w, chosen, positions, [&](int) { return s.starts[w].positions.data(); });
+    const std::vector<double> v = s.rows_for(w, chosen, velocities, [&](int) { return still.data(); });
+    const std::vector<std::int64_t> shape = {std::ssize(chosen), still.rows(), 3};
+    s.worlds[w].reset(environments, dense(x, shape), dense(v, shape));
+  }
+  for (LiveEffector& live : s.effectors)
+    for (const int e : chosen) {
+      std::copy_n(live.start_poses.begin() + 7 * e, 7, live.poses.begin() + 7 * e);
+      live.closed[static_cast<std::size_t>(e)] = false;
+    }
+  if (std::ssize(chosen) == s.environments) s.interrupted = false;
+  s.show();
+}
+
+void LiveScene::step(int count) {
+  Storage& s = *storage_;
+  if (count < 0) throw InputError("count: found " + std::to_string(count) + ", expected 0 or more");
+  if (s.interrupted)
+    throw InputError(
+        "found environments whose last step was interrupted, expected a reset or a load of all before the "
+        "next");
+  s.interrupted = true;
+  s.stop = false;
+  if (s.quasistatic) {
+    for (int k = 0; k < count; ++k) {
+      sim::step(s.worlds, s.threads);
+      stop_motion(s.worlds);
+    }
+  } else {
+    sim::step(s.worlds, s.threads, count);
+  }
+  s.interrupted = false;
+  s.show();
+}
+
+void LiveScene::stop() { storage_->stop = true; }
+
+Tensor LiveScene::positions(const std::string& object) const {
+  const LiveObject& own = storage_->object(object);
+  return Storage::rows_of(own, storage_->worlds[own.worlds].positions());
+}
+
+Tensor LiveScene::velocities(const std::string& object) const {
+  const LiveObject& own = storage_->object(object);
+  return Storage::rows_of(own, storage_->worlds[own.worlds].velocities());
+}
+
+Tensor LiveScene::force(const std::string& end_effector) const {
+  return dense(storage_->effector(end_effector).forces, {size(), 3});
+}
+
+Tensor LiveScene::pose(const std::string& end_effector) const {
+  return dense(storage_->effector(end_effector).poses, {size(), 7});
+}
+
+Tensor LiveScene::status() const {
+  constexpr std::int64_t columns = sizeof(WorldStatus) / sizeof(double);
+  return {.data = &storage_->status.front().steps, .shape = {size(), columns}};
+}
+
+const std::string& LiveScene::why_lost(int environment) const {
+  for (const Worlds& of_object : storage_->worlds)
+    if (of_object.lost(environment) != Lost::no) return of_object.why_lost(environment);
+  return storage_->worlds.front().why_lost(environment);
+}
+
+std::shared_ptr<const LiveScene::Saved> LiveScene::save(const Chosen& environments) const {
+  const Storage& s = *storage_;
+  const std::span<const int> chosen = s.chosen_of(environments);
+  if (s.interrupted)
+    throw InputError("found environments whose last step was interrupted, expected whole ones");
+  auto saved = std::make_shared<Saved>();
+  for (const Worlds& of_object : s.worlds) saved->worlds.push_back(of_object.save(environments));
+  for (const LiveEffector& live : s.effectors) {
+    Saved::Effector& effector = saved->effectors.emplace_back();
+    for (const int e : chosen) {
+      effector.poses.insert(effector.poses.end(), live.poses.begin() + 7 * e,
+                            live.poses.begin() + 7 * (e + 1));
+      effector.closed.push_back(live.closed[static_cast<std::size_t>(e)]);
+    }
+  }
+  return saved;
+}
+
+void LiveScene::load(const Chosen& environments, const Saved& saved) {
+  Storage& s = *storage_;
+  const std::span<const int> chosen = s.chosen_of(environments);
+  if (saved.effectors.size() != s.effectors.size() || saved.worlds.size() != s.worlds.size())
+    throw InputError("state: found one of another scene or of other end effectors, expected these");
+  for (std::size_t w = 0; w < s.worlds.size(); ++w) s.worlds[w].load(environments, saved.worlds[w]);
+  for (std::size_t k = 0; k < s.effectors.size(); ++k)
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      const Saved::Effector& effector = saved.effectors[k];
+      std::copy_n(effector.poses.begin() + 7 * static_cast<std::ptrdiff_t>(i), 7,
+                  s.effectors[k].poses.begin() + 7 * chosen[i]);
+      s.effectors[k].closed[static_cast<std::size_t>(chosen[i])] = effector.closed[i];
+    }
+  if (std::ssize(chosen) == s.environments) s.interrupted = false;
+  s.show();
+}
+
+}  // namespace flash::sim

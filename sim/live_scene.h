@@ -1,0 +1,117 @@
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "data/mesh.h"
+#include "data/scene.h"
+#include "sim/worlds.h"
+
+namespace flash::sim {
+
+/// An object of a live scene.
+struct LiveObject {
+  std::string name;
+  data::Triangles triangles;  ///< that can be seen, by the object's own vertices, from 0
+  bool is_solid = false;
+  std::size_t worlds = 0;  ///< number of the worlds that have it; objects that meet share one
+  int body = 0;            ///< of their plan
+  std::int64_t first_vertex = 0, vertices = 0;
+};
+
+/// Numbers of a material by name, one for each environment.
+using MaterialNumbers = std::vector<std::pair<std::string, std::vector<double>>>;
+
+/// The objects of a scene in many environments that stay alive, with end effectors that code adds, moves,
+/// closes and opens. What moves by the scene's own file goes on doing so. Of what Worlds promises all holds.
+///
+/// Objects and end effectors are meant by name. What throws data::InputError names the argument, and changes
+/// nothing.
+class LiveScene {
+ public:
+  /// `environments` of each object, all alike. Throws data::InputError as load_scene and scene_worlds do.
+  /// `threads`: 0: one a processor.
+  LiveScene(const data::Scene& scene, int environments, int threads);
+  ~LiveScene();
+
+  int size() const;
+  double time_step() const;  ///< [s]
+  const std::vector<LiveObject>& objects() const;
+  std::vector<std::string> end_effectors() const;   ///< those that were added, in their order
+  std::vector<std::string> obstacles() const;       ///< of the scene, and end effectors that collide
+  const std::vector<std::string>& notices() const;  ///< what was understood of the scene
+
+  /// `poses`: environments x 7, as Worlds has them. Throws after the first step, and for a name that is
+  /// taken.
+  void add_end_effector(const EndEffector& effector, const Tensor& poses);
+
+  /// Where it is at the end of the next step: environments x 7.
+  void move_end_effector(const std::string& name, const Chosen& environments, const Tensor& poses);
+
+  /// Closes it in the next step, on what is within its reach when that begins. One that is closed stays so,
+  /// with what it carries or with nothing.
+  void close(const std::string& name, const Chosen& environments);
+
+  /// Opens it in the next step.
+  void open(const std::string& name, const Chosen& environments);
+
+  /// How many vertices an end effector carries in each environment.
+  std::vector<int> held(const std::string& name) const;
+
+  /// Of one object, numbers for the environments chosen; those without a name here stay. Energy that a
+  /// material stores jumps with it.
+  void set_material(const std::string& object, const Chosen& environments, const MaterialNumbers& numbers);
+
+  /// All numbers of the material of one object, one for each environment.
+  MaterialNumbers material(const std::string& object) const;
+
+  /// Coulomb coefficients of an obstacle on an object, one for each environment.
+  void set_friction(const std::string& object, const std::string& obstacle, const Chosen& environments,
+                    const std::vector<double>& friction);
+
+  /// environments x 3 [m/s^2].
+  void set_gravity(const Chosen& environments, const Tensor& gravity);
+
+  /// environments x vertices of the object x 3 [m/s].
+  void set_velocities(const std::string& object, const Chosen& environments, const Tensor& velocities);
+
+  /// Back to the start: state, what is held, end effectors, but not materials, friction and gravity. The k-th
+  /// tensors are those of the k-th object, environments x its vertices x 3. One with positions alone starts
+  /// there without velocity; one with neither, or of a list that ends before, as the scene says.
+  void reset(const Chosen& environments, const std::vector<Tensor>& positions = {},
+             const std::vector<Tensor>& velocities = {});
+
+  /// Takes the next steps of all environments. Throws data::Stopped where `stop` was called meanwhile, and
+  /// what else Worlds::step does. After that it refuses to, until all environments were reset or loaded.
+  void step(int count = 1);
+
+  /// Ends a `step` in another thread soon.
+  void stop();
+
+  // Views that stay where they are. What is in them is as it was at the end of the last step.
+  Tensor positions(const std::string& object) const;    ///< environments x vertices x 3 [m]
+  Tensor velocities(const std::string& object) const;   ///< environments x vertices x 3 [m/s]
+  Tensor force(const std::string& end_effector) const;  ///< it on the objects: environments x 3 [N]
+  Tensor pose(const std::string& end_effector) const;   ///< where it was told to be: environments x 7
+  Tensor status() const;  ///< environments x 7, the fields of WorldStatus, the worst of the objects
+
+  /// Why an environment is lost; empty where it is not.
+  const std::string& why_lost(int environment) const;
+
+  /// Environments as they stand. Takes as much memory as they do.
+  class Saved;
+  std::shared_ptr<const Saved> save(const Chosen& environments) const;
+
+  /// The i-th environment that was saved goes to the i-th of these. Throws data::InputError unless this scene
+  /// has saved it.
+  void load(const Chosen& environments, const Saved& saved);
+
+ private:
+  struct Storage;
+  std::unique_ptr<Storage> storage_;
+};
+
+}  // namespace flash::sim

@@ -1,0 +1,17 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sim/tensor.h"
+
+namespace flash::sim {
+
+/// The numbers of a tensor that has an entry of `shape_of_each` for each environment of `chosen`, in their
+/// order. Throws data::InputError, which begins with `what`, unless they are dense and finite float64 of that
+/// shape in the memory of the processor.
+const double* entries_of(const std::string& what, std::span<const int> chosen, const Tensor& numbers,
+                         const std::vector<std::int64_t>& shape_of_each);
+
+}  // namespace flash::sim

@@ -1,0 +1,257 @@
+#include "sim/live_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "data/error.h"
+
+namespace flash::sim {
+namespace {
+
+/// A scene of coarse sheets on a table, side by side; several meet each other, or do not.
+class LiveScenes : public testing::Test {
+ protected:
+  LiveScenes()
+      : folder_(
+            std::filesystem::temp_directory_path() /
+            ("flash_live_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    std::ofstream(folder_ / "towel.json")
+        << R"({"schema": "flash-asset/1", "mesh": "sheet:0.2x0.2:0.04", "element_type": "TRIANGLE",
+               "mechanical_props": {"areal_density": 0.2, "thickness": 0.001, "young": 1e5, "poisson": 0.3,
+               "constitutive": "TRI_COROTATED", "bending_rigidity": 3e-5, "friction": 0.3}})";
+  }
+  ~LiveScenes() override { std::filesystem::remove_all(folder_); }
+
+  data::Scene scene(bool two, bool meet) const {
+    std::ofstream file(folder_ / "scene.json");
+    file
+        << R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5, "gravity": [0, 0, -9.81],
+                "obstacles": {"table": {"shape": "plane", "normal": [0, 0, 1]}},)"
+        << (meet ? R"("self_contact": {"thickness": 0.001},)" : "") << R"("objects": {"a": "towel.json")"
+        << (two ? R"(, "b": {"asset": "towel.json", "start": {"T_base_object": [0.3, 0, 0.002, 0, 0, 0, 1]}})"
+                : "")
+        << "}}";
+    file.close();
+    return data::load_scene((folder_ / "scene.json").string());
+  }
+
+  std::filesystem::path folder_;
+};
+
+/// The hand over the corner of object a; environment e stands e mm farther.
+std::vector<double> poses(int environments, double z) {
+  std::vector<double> all;
+  for (int e = 0; e < environments; ++e)
+    for (const double number : {0.2 - 0.001 * e, 0.2, z, 0.0, 0.0, 0.0, 1.0}) all.push_back(number);
+  return all;
+}
+
+Tensor tensor(const std::vector<double>& numbers, std::vector<std::int64_t> shape) {
+  return {.data = numbers.data(), .shape = std::move(shape)};
+}
+
+EndEffector hand() { return {.name = "hand", .half_extents = {0.03, 0.03, 0.01}, .threshold = 0.002}; }
+
+/// The numbers of one environment of a view.
+std::vector<double> row(const Tensor& view, int environment) {
+  std::vector<std::int64_t> strides = view.strides;
+  if (strides.empty()) {
+    strides.assign(view.shape.size(), 1);
+    for (std::size_t k = strides.size() - 1; k-- > 0;) strides[k] = strides[k + 1] * view.shape[k + 1];
+  }
+  std::int64_t count = 1;
+  for (std::size_t k = 1; k < view.shape.size(); ++k) count *= view.shape[k];
+  const auto* first = static_cast<const double*>(view.data) + environment * strides[0];
+  return {first, first + count};
+}
+
+double height(int k) { return k <= 10 ? 0.05 - 0.0039 * k : 0.011 + 0.004 * std::max(0, k - 12); }
+
+/// Down on the corner, closes, lifts it; from the step `first` on.
+void drive(LiveScene& live, int first, int last) {
+  for (int k = first; k < last; ++k) {
+    const std::vector<double> now = poses(live.size(), height(k));
+    live.move_end_effector("hand", {}, tensor(now, {live.size(), 7}));
+    if (k >= 12) live.close("hand", {});
+    live.step();
+  }
+}
+
+TEST_F(LiveScenes, EachEnvironmentIsTheSameAlone) {
+  for (const bool meet : {false, true}) {
+    LiveScene all(scene(true, meet), 3, 2);
+    all.add_end_effector(hand(), tensor(poses(3, 0.05), {3, 7}));
+    drive(all, 0, 20);
+    EXPECT_GT(all.held("hand")[2], 0);
+    for (int e = 0; e < 3; ++e) {
+      LiveScene alone(scene(true, meet), 1, 1);
+      const std::vector<double> own = poses(3, 0.05);
+      const std::vector<double> start(own.begin() + 7 * e, own.begin() + 7 * (e + 1));
+      alone.add_end_effector(hand(), tensor(start, {1, 7}));
+      for (int k = 0; k < 20; ++k) {
+        std::vector<double> now = poses(1, height(k));
+        now[0] = 0.2 - 0.001 * e;
+        alone.move_end_effector("hand", {}, tensor(now, {1, 7}));
+        if (k >= 12) alone.close("hand", {});
+        alone.step();
+      }
+      for (const char* object : {"a", "b"}) {
+        EXPECT_EQ(row(all.positions(object), e), row(alone.positions(object), 0));
+        EXPECT_EQ(row(all.velocities(object), e), row(alone.velocities(object), 0));
+      }
+      EXPECT_EQ(row(all.force("hand"), e), row(alone.force("hand"), 0));
+      EXPECT_EQ(row(all.status(), e), row(alone.status(), 0));
+    }
+  }
+}
+
+// At rest the hand carries the weight that the table does not.
+TEST_F(LiveScenes, AHandThatHoldsAllOfASheetCarriesItsWeight) {
+  LiveScene live(scene(false, false), 1, 1);
+  EndEffector large = hand();
+  large.half_extents = {0.2, 0.2, 0.01};
+  std::vector<double> pose = {0.1, 0.1, 0.011, 0, 0, 0, 1};
+  live.add_end_effector(large, tensor(pose, {1, 7}));
+  live.close("hand", {});
+  for (int k = 0; k < 40; ++k) {
+    pose[2] = 0.011 + 0.002 * std::min(k, 20);
+    live.move_end_effector("hand", {}, tensor(pose, {1, 7}));
+    live.step();
+  }
+  EXPECT_EQ(live.held("hand")[0], live.objects()[0].vertices);
+  // As exactly as a step is solved: a thousandth of the weight.
+  const double weight = 0.2 * 0.2 * 0.2 * 9.81;
+  EXPECT_NEAR(row(live.force("hand"), 0)[2], weight, 1e-3 * weight);
+}
+
+TEST_F(LiveScenes, AClosedHandTakesNothingUntilItHasOpened) {
+  LiveScene live(scene(false, false), 1, 1);
+  live.add_end_effector(hand(), tensor(poses(1, 0.05), {1, 7}));
+  live.close("hand", {});  // in the air
+  drive(live, 0, 13);
+  EXPECT_EQ(live.held("hand")[0], 0);
+  live.open("hand", {});
+  live.step();
+  live.close("hand", {});
+  live.step();
+  EXPECT_GT(live.held("hand")[0], 0);
+}
+
+TEST_F(LiveScenes, WhatIsSavedGoesOnAndWhatIsResetBeginsAgain) {
+  LiveScene live(scene(true, false), 2, 1);
+  live.add_end_effector(hand(), tensor(poses(2, 0.05), {2, 7}));
+  const double* place = static_cast<const double*>(live.positions("b").data);
+  drive(live, 0, 12);
+  const auto saved = live.save({});
+  drive(live, 12, 20);
+  const std::vector<double> end = row(live.positions("a"), 1), force = row(live.force("hand"), 1);
+  live.load({}, *saved);
+  EXPECT_EQ(row(live.pose("hand"), 1)[2], height(11));
+  drive(live, 12, 20);
+  EXPECT_EQ(row(live.positions("a"), 1), end);
+  EXPECT_EQ(row(live.force("hand"), 1), force);
+  live.reset(std::vector{1});
+  EXPECT_EQ(row(live.pose("hand"), 1)[2], 0.05);
+  EXPECT_EQ(live.held("hand")[1], 0);
+  EXPECT_GT(live.held("hand")[0], 0);
+  live.reset({});
+  drive(live, 0, 20);
+  EXPECT_EQ(row(live.positions("a"), 1), end);
+  EXPECT_EQ(live.positions("b").data, place);
+  LiveScene other(scene(true, false), 2, 1);
+  EXPECT_THROW(other.load({}, *saved), data::InputError);
+}
+
+TEST_F(LiveScenes, PositionsOfOneObjectLeaveTheOther) {
+  for (const bool meet : {false, true}) {
+    LiveScene live(scene(true, meet), 2, 1);
+    std::vector<double> raised = row(live.positions("b"), 0);
+    const std::vector<double> start = row(live.positions("a"), 0);
+    for (std::size_t i = 2; i < raised.size(); i += 3) raised[i] += 0.5;
+    const std::vector<double> falling(raised.size(), -1.0);
+    const std::int64_t count = live.objects()[1].vertices;
+    live.reset(std::vector{1}, {{}, tensor(raised, {1, count, 3})});
+    live.set_velocities("b", std::vector{1}, tensor(falling, {1, count, 3}));
+    EXPECT_EQ(row(live.positions("b"), 1), raised);
+    EXPECT_EQ(row(live.velocities("b"), 1), falling);
+    EXPECT_EQ(row(live.positions("a"), 1), start);
+    EXPECT_NE(row(live.positions("b"), 0), raised);
+  }
+}
+
+TEST_F(LiveScenes, MaterialsAreThoseOfEachEnvironment) {
+  LiveScene live(scene(true, true), 2, 1);
+  live.set_material("b", std::vector{1}, {{"bending_rigidity", {1e-4}}, {"friction", {0.9}}});
+  const auto value = [&](const char* object, const std::string& name, std::size_t e) {
+    for (const auto& [known, numbers] : live.material(object))
+      if (known == name) return numbers[e];
+    return std::numeric_limits<double>::quiet_NaN();
+  };
+  EXPECT_EQ(value("b", "bending_rigidity", 1), 1e-4);
+  EXPECT_EQ(value("b", "friction", 1), 0.9);
+  EXPECT_EQ(value("b", "bending_rigidity", 0), 3e-5);
+  EXPECT_EQ(value("a", "bending_rigidity", 1), 3e-5);
+  EXPECT_EQ(value("b", "membrane_stiffness", 1), 100);  // E t
+  EXPECT_THROW(live.set_material("b", {}, {{"bending", {1, 1}}}), data::InputError);
+  EXPECT_THROW(live.set_material("b", {}, {{"friction", {1}}}), data::InputError);
+  EXPECT_THROW(live.set_material("b", {}, {{"friction", {1, -1}}}), data::InputError);
+  EXPECT_THROW(live.set_material("c", {}, {{"friction", {1, 1}}}), data::InputError);
+  EXPECT_EQ(value("b", "friction", 1), 0.9);
+}
+
+TEST_F(LiveScenes, NamesAndEnvironmentsAreRefused) {
+  LiveScene live(scene(true, false), 2, 1);
+  const std::vector<double> start = poses(2, 0.05);
+  EndEffector named = hand();
+  for (const char* name : {"", "table"}) {
+    named.name = name;
+    EXPECT_THROW(live.add_end_effector(named, tensor(start, {2, 7})), data::InputError);
+  }
+  live.add_end_effector(hand(), tensor(start, {2, 7}));
+  EXPECT_THROW(live.add_end_effector(hand(), tensor(start, {2, 7})), data::InputError);
+  EXPECT_THROW(live.positions("hand"), data::InputError);
+  EXPECT_THROW(live.force("a"), data::InputError);
+  for (const std::vector<int>& numbers : {std::vector{2}, std::vector{-1}, std::vector{0, 0}}) {
+    EXPECT_THROW(live.close("hand", numbers), data::InputError);
+    EXPECT_THROW(live.reset(numbers), data::InputError);
+    EXPECT_THROW(live.save(numbers), data::InputError);
+  }
+  EXPECT_THROW(LiveScene(scene(true, false), 0, 1), data::InputError);
+}
+
+// Asked to stop all the time, it does within a step, and is whole again after a reset.
+TEST_F(LiveScenes, AStepThatWasStoppedIsNotGoneOnWith) {
+  LiveScene live(scene(true, false), 2, 1);
+  const std::vector<double> start = row(live.positions("a"), 0);
+  std::thread stopper;
+  EXPECT_THROW(
+      {
+        stopper = std::thread([&] {
+          for (int k = 0; k < 1000; ++k) {
+            live.stop();
+            std::this_thread::yield();
+          }
+        });
+        live.step(1000000);
+      },
+      data::Stopped);
+  stopper.join();
+  EXPECT_THROW(live.step(), data::InputError);
+  live.reset(std::vector{0});
+  EXPECT_THROW(live.step(), data::InputError);
+  live.reset({});
+  EXPECT_EQ(row(live.positions("a"), 0), start);
+  live.step();
+}
+
+}  // namespace
+}  // namespace flash::sim
