@@ -1,11 +1,14 @@
 #include "calib/check/contradiction.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include "calib/geometry/pose.h"
 #include "data/median.h"
+#include "data/text.h"
 
 namespace flash::calib {
 namespace {
@@ -36,6 +39,38 @@ std::string moved_by(const Eigen::Isometry3d& before, const Eigen::Isometry3d& n
   std::snprintf(text, sizeof text, "by %.1f mm and %.2f deg", 1e3 * motion.head<3>().norm(),
                 kDegrees * motion.tail<3>().norm());
   return text;
+}
+
+/// The target in another size, wherever these views want it.
+struct ResizedTarget {
+  double size = 1;  ///< over that for which the views have poses
+  Eigen::Isometry3d Z;
+  std::vector<Observation> observations;  ///< with poses of it
+};
+
+/// By least squares of the target's place over the views, T_i(s) = (R_i, s t_i). None where turns alone leave
+/// the size open.
+std::optional<ResizedTarget> resized_target(Setup setup, const Eigen::Isometry3d& X,
+                                            const std::vector<Observation>& observations) {
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  for (const Observation& view : observations) {
+    if (view.T_camera_target.empty()) continue;
+    const PoseLoop loop = pose_loop(setup, view.T_base_gripper, view.T_camera_target.front());
+    const Eigen::Isometry3d T_fixed_camera = loop.G * X;
+    Eigen::Matrix<double, 3, 4> rows;
+    rows << -Eigen::Matrix3d::Identity(), T_fixed_camera.linear() * loop.C.translation();
+    normal += rows.transpose() * rows;
+    right -= rows.transpose() * T_fixed_camera.translation();
+  }
+  const Eigen::LDLT<Eigen::Matrix4d> solver(normal);
+  const double size = solver.solve(right)[3];
+  if (!(solver.rcond() > 1e-9 && size > 0)) return std::nullopt;
+  ResizedTarget result{size, {}, observations};
+  for (Observation& view : result.observations)
+    for (Eigen::Isometry3d& pose : view.T_camera_target) pose.translation() *= size;
+  result.Z = target_pose_from(setup, X, result.observations);
+  return result;
 }
 
 /// The view from which on all miss, where all before it do not.
@@ -70,9 +105,11 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
   Contradiction result{.ratio = ratio_of(check.mm_rms, check.deg_rms, stated), .sentence = {}};
   if (result.ratio <= kContradicts) return result;
 
-  const auto ratio_at = [&](const HandEyePoses& at) {
-    const ProjectionCheck moved = check_projection(extrinsics.setup, at, lens, target, observations,
-                                                   extrinsics.target, extrinsics.edge_offset);
+  const auto ratio_at = [&](const HandEyePoses& at, const std::vector<Observation>& views, double size = 1) {
+    TargetShape shape = extrinsics.target;
+    shape.scale *= size;
+    const ProjectionCheck moved =
+        check_projection(extrinsics.setup, at, lens, target, views, shape, extrinsics.edge_offset);
     return ratio_of(moved.mm_rms, moved.deg_rms, stated);
   };
   const HandEyePoses target_moved{poses.X, target_pose_from(extrinsics.setup, poses.X, observations)};
@@ -83,20 +120,27 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
       target_is_refitted && seen.size() >= 3
           ? shah(pose_loops(extrinsics.setup, seen))
           : HandEyePoses{camera_pose_from(extrinsics.setup, poses.Z, observations), poses.Z};
-  const double by_target = target_is_refitted ? result.ratio : ratio_at(target_moved),
-               by_camera = ratio_at(camera_moved);
+  const std::optional<ResizedTarget> resized = resized_target(extrinsics.setup, poses.X, observations);
+  const double by_target = target_is_refitted ? result.ratio : ratio_at(target_moved, observations),
+               by_camera = ratio_at(camera_moved, observations),
+               by_size =
+                   resized ? ratio_at({poses.X, resized->Z}, resized->observations, resized->size) : INFINITY;
   std::string cause;
   if (by_target <= kContradicts && by_target <= by_camera)
     cause = "the target is not where it was at the calibration, " + moved_by(poses.Z, target_moved.Z) +
             ": these views cannot check the calibration; --refit-target takes its place from them";
+  else if (by_size <= kContradicts && by_size <= by_camera)
+    cause = "the target is " + data::format_short(resized->size * extrinsics.target.scale) +
+            " times as large as stated, and was " + data::format_short(extrinsics.target.scale) +
+            " times at the calibration: another print, or another size stated; these views cannot check the "
+            "calibration: measure a square";
   else if (by_camera <= kContradicts)
     cause = "the camera is not where it was at the calibration, " + moved_by(poses.X, camera_moved.X) +
             ": calibrate again";
   else
     cause =
         "neither a target nor a camera that was moved explains it: another setup, target, robot or lens, "
-        "something "
-        "that moved meanwhile, or a robot that errs more in these poses";
+        "something that moved meanwhile, or a robot that errs more in these poses";
   char text[160];
   std::snprintf(text, sizeof text,
                 "the target is missed by %.1f mm and %.2f deg (rms%s), where the calibration states %.1f mm "

@@ -23,9 +23,10 @@ struct Contradiction {
 };
 
 /// Views contradict a calibration that they miss by three times the stated error: noise does so in less than
-/// one of 1,000 recordings of four views. Then the target, the camera or both are put where these views want
-/// them, to say what has moved. observations: with poses of a target of that shape through that lens. poses:
-/// X, and Z as it is validated; `target_is_refitted`: from these views.
+/// one of 1,000 recordings of four views. Then the target, in its own or another size, the camera or both are
+/// put where these views want them, to say what has moved or is of another size. observations: with poses of
+/// a target of that shape through that lens. poses: X, and Z as it is validated; `target_is_refitted`: from
+/// these views.
 Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& poses, bool target_is_refitted,
                             const data::CameraIntrinsics& lens, const Target& target,
                             const std::vector<Observation>& observations, const ProjectionCheck& check);

@@ -29,7 +29,7 @@ struct Validation {
 };
 
 Validation validated(Setup setup, unsigned seed, const Vector6d& camera_motion, const Vector6d& target_motion,
-                     bool refit_target = false) {
+                     bool refit_target = false, double target_size = 1) {
   SceneSettings settings = settings_of(setup);
   settings.views = 30;
   const Target target = parse_target("chessboard:9x6:0.025");
@@ -44,8 +44,9 @@ Validation validated(Setup setup, unsigned seed, const Vector6d& camera_motion, 
     const Eigen::Isometry3d T =
         now.X.inverse() * (setup == Setup::eye_in_hand ? pose.inverse() : pose) * now.Z;
     for (Eigen::Index k = 0; k < scene.points.cols(); ++k)
-      views[i].pixels.col(k) = project(to_vector(scene.camera),
-                                       T * scene.points.col(views[i].points[static_cast<std::size_t>(k)]));
+      views[i].pixels.col(k) =
+          project(to_vector(scene.camera),
+                  T * (target_size * scene.points.col(views[i].points[static_cast<std::size_t>(k)])));
     views[i].T_camera_target = {T};
   }
   Validation result;
@@ -91,6 +92,19 @@ TEST_P(Contradicts, ACameraThatHasMovedIsToldWhereverTheTargetIsTaken) {
               std::string::npos)
         << found.sentence;
   }
+}
+
+TEST_P(Contradicts, ATargetOfAnotherSizeIsToldWhereverItIs) {
+  for (const double size : {0.9, 1.03, 1.2})
+    for (const bool refit_target : {false, true})
+      for (const Vector6d& motion : {shift(0, 0, 0), shift(0.012, -0.02, 0.01)}) {
+        const Contradiction found =
+            validated(GetParam(), 3, shift(0, 0, 0), motion, refit_target, size).found;
+        const std::string begin = "the target is ";
+        const std::size_t at = found.sentence.find(begin, found.sentence.find(": "));
+        ASSERT_NE(at, std::string::npos) << found.sentence;
+        EXPECT_NEAR(std::stod(found.sentence.substr(at + begin.size())), size, 0.01) << found.sentence;
+      }
 }
 
 TEST_P(Contradicts, WhatNeitherExplainsIsSaid) {
