@@ -284,7 +284,7 @@ def print_right(kind, twins, bounds):
         shares = [f"{sum(h for h, _, _ in sides[two])} of {len(sides[two])}" for two in (True, False)]
         ratios = [(coordinate(name, f["interval95"][1]) - coordinate(name, f["interval95"][0])) / (2 * NORMAL * bounds[twin["seed"]][name])
                   for _, twin, f in sides[True] if twin["seed"] in bounds]
-        score = numpy.mean([interval_score(name, twin["parameters"][name], twin["truth"][name]) for twin in twins])
+        score = math.nan if not twins else numpy.mean([interval_score(name, twin["parameters"][name], twin["truth"][name]) for twin in twins])
         bounded = [twin for twin in twins if twin["seed"] in bounds]
         claims = sum(could_claim(kind, name, twin["truth"][name], bounds[twin["seed"]][name]) for twin in bounded)
         print(f"{name:10} {len(twins):6} {len(sides[True]) + len(sides[False]):7} {shares[0]:>15} {shares[1]:>15} {score:7.2f} "
@@ -365,6 +365,9 @@ def main():
     rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
             for twin in sorted(found, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]
     (options.out / "coverage.json").write_text(json.dumps(rows, indent=1))
+    if not rows:
+        print(f"\n{options.kind}: none of {len(jobs)} was searched in time")
+        return 1
     print(f"\n{options.kind}, seeds {rows[0]['seed']} to {rows[-1]['seed']}, {len(rows)} of {len(jobs) + len(earlier)} searched")
     print_right(kind, [twin for twin in found if not twin["wrong"]], bounds)
     print_wrong(kind, [twin for twin in found if twin["wrong"]])
