@@ -191,12 +191,16 @@ class RealtimeSim:
     def set_material(self, body=None, env_ids=None, **values):
         """Sets numbers of material(body): one number, or (n,). Energy that a material stores jumps with it.
 
-        `friction` holds against what states no coefficient of its own; set_friction sets the others.
+        `friction` holds against what states no coefficient of its own, and is refused where everything does: set_friction
+        sets those.
         """
         simulation = self._ready("set_material")
         body = self._body("set_material: body", body)
         ids = self._ids("set_material", env_ids)
         known = [name for name, _ in simulation.material(body)]
+        if "friction" in values and not self._friction_counts(body):
+            raise ValueError("set_material: friction: found obstacles that all state their own, so that it would change nothing, "
+                             "expected set_friction")
         simulation.set_material(body, ids, [
             (arguments.one_of("set_material", name, known), arguments.per_environment(f"set_material: {name}", value, len(ids)))
             for name, value in values.items()])
@@ -226,6 +230,7 @@ class RealtimeSim:
 
         "identified": draws of the posterior of each tuned asset, see Asset.draws. "published": what the asset has times
         factors of 0.5 to 1.5, even and independent, for stiffness, bending, density and friction. "none": what the asset has.
+        Friction is left out where every obstacle states its own.
         """
         simulation = self._ready("randomize")
         arguments.one_of("randomize: how", how, ("identified", "published", "none"))
@@ -235,7 +240,9 @@ class RealtimeSim:
         drawn = {}
         for body in self.bodies:
             start = {name: np.full(len(ids), values[0]) for name, values in self._start_materials[body].items()}
-            drawn[body] = start | _drawn(how, self.asset(body), start, random)
+            if not self._friction_counts(body):
+                del start["friction"]
+            drawn[body] = start | _drawn(how, self.asset(body), start, len(ids), random)
         for body, values in drawn.items():
             simulation.set_material(body, ids, list(values.items()))
         return drawn
@@ -301,6 +308,9 @@ class RealtimeSim:
     def _effector(self, what, name):
         return arguments.one_of(what, name, self._simulation.end_effectors())
 
+    def _friction_counts(self, body):
+        return not self._simulation.obstacles() or self._simulation.uses_material_friction(body)
+
     def _new_name(self, what, name):
         if not arguments.text(what, name) or name in self._simulation.end_effectors():
             raise ValueError(f"{what}: found {name!r}, expected a name that no other end effector has")
@@ -330,8 +340,7 @@ class RealtimeSim:
                 for body in self._triangles]
 
 
-def _drawn(how, asset, start, random):
-    count = len(start["friction"])
+def _drawn(how, asset, start, count, random):
     if how == "none":
         return {}
     if how == "published":

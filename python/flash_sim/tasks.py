@@ -128,7 +128,7 @@ class TowelTeacher:
     hover = 0.05        # above the corner [m]
     horizontal = 0.01   # from the corner, from where on the hand goes down [m]
     grip = 0.0145       # of the hand above the corner when it closes [m]
-    arc = 0.5, 0.1      # height of the way over: times what is left of it, and at most [m]
+    arc = 0.8, 0.15     # height of the way over: times what is left of it, and at most [m]; lower, the fold drags on the rest
     carry = 0.6         # speed with the corner, as a share of the hand's
     put = 0.02          # from the goal, where it opens [m]
 
