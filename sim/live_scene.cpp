@@ -349,6 +349,18 @@ MaterialNumbers LiveScene::material(const std::string& object) const {
   return numbers;
 }
 
+bool LiveScene::uses_material_friction(const std::string& object) const {
+  const LiveObject& own = storage_->object(object);
+  const Worlds& worlds = storage_->worlds[own.worlds];
+  constexpr double none = -1;
+  return std::any_of(storage_->every.begin(), storage_->every.end(), [&](int e) {
+    const std::vector<Obstacle>& obstacles = worlds.environment(e).obstacles;
+    return std::any_of(obstacles.begin(), obstacles.end(), [&](const Obstacle& obstacle) {
+      return friction_on(obstacle, own.body, none) == none;
+    });
+  });
+}
+
 void LiveScene::set_friction(const std::string& object, const std::string& obstacle,
                              const Chosen& environments, const std::vector<double>& friction) {
   Storage& s = *storage_;

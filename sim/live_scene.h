@@ -68,6 +68,9 @@ class LiveScene {
   /// All numbers of the material of one object, one for each environment.
   MaterialNumbers material(const std::string& object) const;
 
+  /// Whether an obstacle takes the friction of the object's material, as it states none of its own.
+  bool uses_material_friction(const std::string& object) const;
+
   /// Coulomb coefficients of an obstacle on an object, one for each environment.
   void set_friction(const std::string& object, const std::string& obstacle, const Chosen& environments,
                     const std::vector<double>& friction);

@@ -169,6 +169,9 @@ void bind_simulation(nb::module_& module) {
                                     const Environments& environments, const sim::MaterialNumbers& numbers) {
     s.use([&](LiveScene& live) { live.set_material(object, environments, numbers); });
   });
+  simulation.def("uses_material_friction", [](Simulation& s, const std::string& object) {
+    return s.use([&](LiveScene& live) { return live.uses_material_friction(object); });
+  });
   simulation.def("set_friction", [](Simulation& s, const std::string& object, const std::string& obstacle,
                                     const Environments& environments, const std::vector<double>& friction) {
     s.use([&](LiveScene& live) { live.set_friction(object, obstacle, environments, friction); });

@@ -15,7 +15,7 @@ MATERIAL = {"poisson": "poissons_ratio", "bending": "bending_rigidity", "areal_d
 class Asset:
     """An asset file. Of one that `flash-sysid export` has tuned, what was found and how well it is known."""
 
-    def __init__(self, path):
+    def __init__(self, path: str | os.PathLike):
         try:
             self.path = os.fspath(path)
         except TypeError:
@@ -26,32 +26,32 @@ class Asset:
         self._found = self._file.get("identification") or {}
 
     @property
-    def values(self):
+    def values(self) -> dict[str, float]:
         """The numbers of the file by name."""
         return {name: value for name, value in self._file["mechanical_props"].items()
                 if isinstance(value, (int, float)) and not isinstance(value, bool)}
 
     @property
-    def units(self):
+    def units(self) -> dict[str, str]:
         """The unit of each number, where the file states them; "1" for a number without one."""
         return dict(self._found.get("units") or {})
 
     @property
-    def is_identified(self):
+    def is_identified(self) -> bool:
         """Whether it holds draws of a posterior."""
         return bool((self._found.get("samples") or {}).get("values"))
 
     @property
-    def intervals(self):
+    def intervals(self) -> dict[str, tuple[float, float]]:
         """95 % intervals (low, high) of the parameters that were identified, by name."""
         return {name: tuple(interval) for name, interval in (self._found.get("interval95") or {}).items() if interval}
 
     @property
-    def caveats(self):
+    def caveats(self) -> list[str]:
         """What to know of the intervals, a line each."""
         return list(self._found.get("caveats") or [])
 
-    def draws(self, n, seed=0):
+    def draws(self, n: int, seed: int = 0) -> dict[str, np.ndarray]:
         """n joint draws of the posterior: a dict of (n,) arrays, in the units of the file.
 
         The file holds some draws of all parameters together (64 as `flash-sysid export` writes them). These are rows of them:
@@ -67,7 +67,7 @@ class Asset:
         order = np.concatenate([random.permutation(len(rows)) for _ in range(-(-n // len(rows)) or 1)])[:n]
         return {name: rows[order, k] for k, name in enumerate(samples["parameters"])}
 
-    def as_material(self, draws):
+    def as_material(self, draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Draws under the names and units of RealtimeSim.set_material; what a material has no number for is left out."""
         material = {MATERIAL[name]: np.asarray(values) for name, values in draws.items() if name in MATERIAL}
         if "young" in draws:

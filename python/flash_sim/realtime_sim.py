@@ -2,6 +2,7 @@
 import os
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flash_sim import _core, arguments
 from flash_sim.asset import Asset
@@ -31,7 +32,7 @@ class RealtimeSim:
     nothing. An environment whose step fails is lost: status()["lost"] is not 0, the others go on, and reset brings it back.
     """
 
-    def __init__(self, device="auto", seed=0, threads=0):
+    def __init__(self, device: str = "auto", seed: int = 0, threads: int = 0):
         """device: "auto" or "cpu"; this package steps on the processor alone. threads: 0 takes one per processor."""
         if arguments.text("device", device) not in ("auto", "cpu"):
             raise ValueError(f"device: found {device!r}, expected 'auto' or 'cpu': this package has no other device yet")
@@ -42,18 +43,18 @@ class RealtimeSim:
 
     # -- setting up -----------------------------------------------------------------------------------------------------
 
-    def load_config(self, path):
+    def load_config(self, path: str | os.PathLike) -> None:
         """Reads a scene file: the published format, or flash-scene/1. It holds from the next initialize() on."""
         try:
             self._scene = _core.load_scene(os.fspath(path))
         except TypeError:
             raise TypeError(f"load_config: path: found {path!r:.60}, expected the path of a scene file") from None
 
-    def set_envs(self, n_envs):
+    def set_envs(self, n_envs: int) -> None:
         """How many environments the next initialize() makes."""
         self._n_envs = arguments.whole_number("set_envs: n_envs", n_envs, 1, 1_000_000)
 
-    def initialize(self):
+    def initialize(self) -> None:
         """Makes the environments, all at the start of the scene. End effectors are added anew after it."""
         if self._scene is None:
             raise RuntimeError("initialize: found no scene, expected load_config(path) before")
@@ -63,7 +64,8 @@ class RealtimeSim:
         self._assets = self._scene.assets
         self._start_materials = {body: self.material(body) for body in self._triangles}
 
-    def add_ee(self, name, start_pose, size=(0.05, 0.05, 0.05), reach=0.01, friction=None, collides=True):
+    def add_ee(self, name: str, start_pose: ArrayLike, size: ArrayLike = (0.05, 0.05, 0.05), reach: float = 0.01,
+               friction: float | None = None, collides: bool = True) -> None:
         """Adds an open end effector to every environment, before the first step.
 
         start_pose: (7,), (n_envs, 7), or (3,), (n_envs, 3) without a turn. size: edges of its box [m]. The box is an
@@ -80,14 +82,14 @@ class RealtimeSim:
 
     # -- driving --------------------------------------------------------------------------------------------------------
 
-    def move_ee(self, name, pose, env_ids=None):
+    def move_ee(self, name: str, pose: ArrayLike, env_ids: ArrayLike | None = None) -> None:
         """Where an end effector is at the end of the next step, and stays: (7,) or (n, 7); (3,), (n, 3) keep the turn."""
         simulation = self._ready("move_ee")
         self._effector("move_ee: name", name)
         ids = self._ids("move_ee", env_ids)
         simulation.move_end_effector(name, ids, arguments.poses("move_ee: pose", pose, simulation.pose(name)[ids]))
 
-    def grasp_ee(self, name, grasp, env_ids=None):
+    def grasp_ee(self, name: str, grasp: ArrayLike, env_ids: ArrayLike | None = None) -> None:
         """Whether an end effector is closed: bool, or (n,) bool.
 
         Where it closes, the next step begins by taking the vertices that are within reach then. A closed one takes no
@@ -99,7 +101,7 @@ class RealtimeSim:
         closed = arguments.truths("grasp_ee: grasp", grasp, len(ids))
         simulation.grasp(name, [e for e, c in zip(ids, closed) if c], [e for e, c in zip(ids, closed) if not c])
 
-    def step(self, count=1):
+    def step(self, count: int = 1) -> None:
         """Takes `count` steps of all environments. Other threads of Python run meanwhile.
 
         Ctrl-C ends it within a step. After that all environments have to be reset or loaded before the next step.
@@ -109,32 +111,32 @@ class RealtimeSim:
 
     # -- state ----------------------------------------------------------------------------------------------------------
 
-    def positions(self, body=None):
+    def positions(self, body: str | None = None) -> np.ndarray:
         """Live (n_envs, vertices, 3) [m], in the order of the mesh. A scene of one body needs no name."""
         simulation = self._ready("positions")
         return simulation.positions(self._body("positions: body", body))
 
-    def velocities(self, body=None):
+    def velocities(self, body: str | None = None) -> np.ndarray:
         """Live (n_envs, vertices, 3) [m/s]."""
         simulation = self._ready("velocities")
         return simulation.velocities(self._body("velocities: body", body))
 
-    def force(self, ee):
+    def force(self, ee: str) -> np.ndarray:
         """Live (n_envs, 3) [N]: of an end effector on the bodies, by its hold and its surface. A wrist feels the negative."""
         simulation = self._ready("force")
         return simulation.force(self._effector("force: ee", ee))
 
-    def pose(self, ee):
+    def pose(self, ee: str) -> np.ndarray:
         """Live (n_envs, 7): where an end effector has been told to be."""
         simulation = self._ready("pose")
         return simulation.pose(self._effector("pose: ee", ee))
 
-    def held(self, ee):
+    def held(self, ee: str) -> np.ndarray:
         """(n_envs,) int: how many vertices an end effector carries."""
         simulation = self._ready("held")
         return np.array(simulation.held(self._effector("held: ee", ee)), int)
 
-    def status(self):
+    def status(self) -> np.ndarray:
         """Live (n_envs,) of named numbers: steps, time [s], converged, residual, penetration [m], parts, lost.
 
         converged: 0 where a step is not solved to the tolerance of the scene. lost: not 0 where an environment goes no
@@ -142,11 +144,12 @@ class RealtimeSim:
         """
         return self._ready("status").status().view(STATUS)[:, 0]
 
-    def why_lost(self):
+    def why_lost(self) -> list[str]:
         """A line for each environment; empty where it is not lost."""
         return self._ready("why_lost").why_lost()
 
-    def reset(self, env_ids=None, positions=None, velocities=None):
+    def reset(self, env_ids: ArrayLike | None = None, positions: ArrayLike | dict[str, ArrayLike] | None = None,
+              velocities: ArrayLike | dict[str, ArrayLike] | None = None) -> None:
         """Back to the start of the scene: state and end effectors, but not materials, friction and gravity.
 
         positions, velocities: (n, vertices, 3) of the environments chosen, or a dict of them by body. A body that is given
@@ -157,19 +160,19 @@ class RealtimeSim:
         simulation.reset(ids, self._by_body("reset: positions", positions, ids),
                          self._by_body("reset: velocities", velocities, ids))
 
-    def set_velocities(self, body, velocities, env_ids=None):
+    def set_velocities(self, body: str | None, velocities: ArrayLike, env_ids: ArrayLike | None = None) -> None:
         """(n, vertices, 3) or (vertices, 3) [m/s]."""
         simulation = self._ready("set_velocities")
         body = self._body("set_velocities: body", body)
         ids = self._ids("set_velocities", env_ids)
         simulation.set_velocities(body, ids, self._rows("set_velocities: velocities", body, velocities, ids))
 
-    def save_state(self, env_ids=None):
+    def save_state(self, env_ids: ArrayLike | None = None) -> _core.State:
         """The environments as they stand, solvers included: what is loaded goes on bitwise as this does."""
         simulation = self._ready("save_state")
         return simulation.save(self._ids("save_state", env_ids))
 
-    def load_state(self, state, env_ids=None):
+    def load_state(self, state: _core.State, env_ids: ArrayLike | None = None) -> None:
         """The i-th environment that was saved goes to the i-th of `env_ids`."""
         simulation = self._ready("load_state")
         if not isinstance(state, _core.State):
@@ -178,7 +181,7 @@ class RealtimeSim:
 
     # -- what differs between environments --------------------------------------------------------------------------------
 
-    def material(self, body=None):
+    def material(self, body: str | None = None) -> dict[str, np.ndarray]:
         """The numbers of a body's material by name, (n_envs,) each.
 
         Of a sheet: membrane_stiffness = E t [N/m], poissons_ratio, areal_density [kg/m^2], bending_rigidity D [N m],
@@ -188,20 +191,24 @@ class RealtimeSim:
         simulation = self._ready("material")
         return {name: np.array(values) for name, values in simulation.material(self._body("material: body", body))}
 
-    def set_material(self, body=None, env_ids=None, **values):
+    def set_material(self, body: str | None = None, env_ids: ArrayLike | None = None, **values: ArrayLike) -> None:
         """Sets numbers of material(body): one number, or (n,). Energy that a material stores jumps with it.
 
-        `friction` holds against what states no coefficient of its own; set_friction sets the others.
+        `friction` holds against what states no coefficient of its own, and is refused where everything does: set_friction
+        sets those.
         """
         simulation = self._ready("set_material")
         body = self._body("set_material: body", body)
         ids = self._ids("set_material", env_ids)
         known = [name for name, _ in simulation.material(body)]
+        if "friction" in values and not self._friction_counts(body):
+            raise ValueError("set_material: friction: found obstacles that all state their own, so that it would change nothing, "
+                             "expected set_friction")
         simulation.set_material(body, ids, [
             (arguments.one_of("set_material", name, known), arguments.per_environment(f"set_material: {name}", value, len(ids)))
             for name, value in values.items()])
 
-    def set_friction(self, body, obstacle, friction, env_ids=None):
+    def set_friction(self, body: str | None, obstacle: str, friction: ArrayLike, env_ids: ArrayLike | None = None) -> None:
         """The Coulomb coefficient of a body on an obstacle or an end effector: one number, or (n,)."""
         simulation = self._ready("set_friction")
         body = self._body("set_friction: body", body)
@@ -210,22 +217,24 @@ class RealtimeSim:
         simulation.set_friction(body, obstacle, ids,
                                 arguments.per_environment("set_friction: friction", friction, len(ids)))
 
-    def set_gravity(self, gravity, env_ids=None):
+    def set_gravity(self, gravity: ArrayLike, env_ids: ArrayLike | None = None) -> None:
         """(3,) or (n, 3) [m/s^2]."""
         simulation = self._ready("set_gravity")
         ids = self._ids("set_gravity", env_ids)
         given = arguments.numbers("set_gravity: gravity", gravity, (3,), (len(ids), 3))
         simulation.set_gravity(ids, np.array(np.broadcast_to(given, (len(ids), 3))))
 
-    def seed(self, seed):
+    def seed(self, seed: int) -> None:
         """Of what randomize draws. A simulation itself has no chance in it."""
         self._random = np.random.default_rng(arguments.whole_number("seed", seed, 0, 2**63 - 1))
 
-    def randomize(self, how, seed=None, env_ids=None):
+    def randomize(self, how: str, seed: int | None = None,
+                  env_ids: ArrayLike | None = None) -> dict[str, dict[str, np.ndarray]]:
         """Materials of all bodies, drawn for each environment. Returns what was set, by body and name.
 
         "identified": draws of the posterior of each tuned asset, see Asset.draws. "published": what the asset has times
         factors of 0.5 to 1.5, even and independent, for stiffness, bending, density and friction. "none": what the asset has.
+        Friction is left out where every obstacle states its own.
         """
         simulation = self._ready("randomize")
         arguments.one_of("randomize: how", how, ("identified", "published", "none"))
@@ -235,7 +244,9 @@ class RealtimeSim:
         drawn = {}
         for body in self.bodies:
             start = {name: np.full(len(ids), values[0]) for name, values in self._start_materials[body].items()}
-            drawn[body] = start | _drawn(how, self.asset(body), start, random)
+            if not self._friction_counts(body):
+                del start["friction"]
+            drawn[body] = start | _drawn(how, self.asset(body), start, len(ids), random)
         for body, values in drawn.items():
             simulation.set_material(body, ids, list(values.items()))
         return drawn
@@ -243,42 +254,42 @@ class RealtimeSim:
     # -- what it is made of -----------------------------------------------------------------------------------------------
 
     @property
-    def n_envs(self):
+    def n_envs(self) -> int:
         self._ready("n_envs")
         return self._initialized_envs
 
     @property
-    def time_step(self):
+    def time_step(self) -> float:
         """[s]"""
         return self._ready("time_step").time_step()
 
     @property
-    def bodies(self):
+    def bodies(self) -> list[str]:
         """Names of the objects of the scene."""
         self._ready("bodies")
         return list(self._triangles)
 
     @property
-    def end_effectors(self):
+    def end_effectors(self) -> list[str]:
         """Names of those that were added."""
         return self._ready("end_effectors").end_effectors()
 
     @property
-    def obstacles(self):
+    def obstacles(self) -> list[str]:
         """Names of what bodies collide with."""
         return self._ready("obstacles").obstacles()
 
     @property
-    def notices(self):
+    def notices(self) -> list[str]:
         """What was understood of the scene and its assets, a line each."""
         return self._ready("notices").notices()
 
-    def triangles(self, body=None):
+    def triangles(self, body: str | None = None) -> np.ndarray:
         """(triangles, 3) int: the visible triangles by the body's vertices."""
         self._ready("triangles")
         return self._triangles[self._body("triangles: body", body)]
 
-    def asset(self, body=None):
+    def asset(self, body: str | None = None) -> Asset:
         """The Asset that a body was made of."""
         self._ready("asset")
         return Asset(self._assets[self._body("asset: body", body)])
@@ -300,6 +311,9 @@ class RealtimeSim:
 
     def _effector(self, what, name):
         return arguments.one_of(what, name, self._simulation.end_effectors())
+
+    def _friction_counts(self, body):
+        return not self._simulation.obstacles() or self._simulation.uses_material_friction(body)
 
     def _new_name(self, what, name):
         if not arguments.text(what, name) or name in self._simulation.end_effectors():
@@ -330,8 +344,7 @@ class RealtimeSim:
                 for body in self._triangles]
 
 
-def _drawn(how, asset, start, random):
-    count = len(start["friction"])
+def _drawn(how, asset, start, count, random):
     if how == "none":
         return {}
     if how == "published":

@@ -91,3 +91,13 @@ def test_published_ranges_and_none(scene):
     other = start(scene, 400, seed=9)
     sim.seed(9)
     assert np.array_equal(sim.randomize("published")["towel"]["friction"], other.randomize("published")["towel"]["friction"])
+
+
+def test_friction_that_would_change_nothing_is_refused_or_left_out(tmp_path):
+    sim = start(write_scene(tmp_path, obstacles={"table": {"shape": "plane", "normal": [0, 0, 1], "friction": 0.5}}), 2)
+    with pytest.raises(ValueError, match="friction: found obstacles that all state their own"):
+        sim.set_material(friction=0.1)
+    assert set(sim.randomize("published")["towel"]) >= {"bending_rigidity"} and (sim.material()["friction"] == 0.3).all()
+    sim.add_ee("hand", [0, 0, 1])  # which states none
+    sim.set_material(friction=0.1)
+    assert (sim.material()["friction"] == 0.1).all()

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -206,6 +207,12 @@ TEST_F(LiveScenes, MaterialsAreThoseOfEachEnvironment) {
   EXPECT_THROW(live.set_material("b", {}, {{"friction", {1, -1}}}), data::InputError);
   EXPECT_THROW(live.set_material("c", {}, {{"friction", {1, 1}}}), data::InputError);
   EXPECT_EQ(value("b", "friction", 1), 0.9);
+  // The table states no friction until it is set for both environments.
+  live.set_friction("b", "table", std::vector{0}, {0.4});
+  EXPECT_TRUE(live.uses_material_friction("b"));
+  live.set_friction("b", "table", std::vector{1}, {0.4});
+  EXPECT_FALSE(live.uses_material_friction("b"));
+  EXPECT_TRUE(live.uses_material_friction("a"));
 }
 
 TEST_F(LiveScenes, NamesAndEnvironmentsAreRefused) {
@@ -233,10 +240,11 @@ TEST_F(LiveScenes, AStepThatWasStoppedIsNotGoneOnWith) {
   LiveScene live(scene(true, false), 2, 1);
   const std::vector<double> start = row(live.positions("a"), 0);
   std::thread stopper;
+  std::atomic<bool> ended = false;
   EXPECT_THROW(
       {
         stopper = std::thread([&] {
-          for (int k = 0; k < 1000; ++k) {
+          while (!ended) {
             live.stop();
             std::this_thread::yield();
           }
@@ -244,6 +252,7 @@ TEST_F(LiveScenes, AStepThatWasStoppedIsNotGoneOnWith) {
         live.step(1000000);
       },
       data::Stopped);
+  ended = true;
   stopper.join();
   EXPECT_THROW(live.step(), data::InputError);
   live.reset(std::vector{0});

@@ -1,0 +1,112 @@
+"""Tasks, their scripted policy, and their interfaces to libraries of reinforcement learning."""
+import numpy as np
+import pytest
+
+from flash_sim import tasks
+from flash_sim.tasks import TowelSettings, TowelTask, TowelTeacher
+
+SHORT = {"steps_per_action": 1, "time_limit": 3}
+
+
+def fold(task, teacher, disturb=lambda step, actions: None):
+    """Whether each environment was folded, within the time limit."""
+    folded = np.zeros(task.n_envs, bool)
+    for step in range(task.settings.time_limit):
+        actions = teacher.act(task)
+        disturb(step, actions)
+        folded |= task.step(actions)[2]
+        if folded.all():
+            break
+    return folded
+
+
+def test_the_teacher_folds_the_towel_from_random_starts_and_materials():
+    task = TowelTask(8, TowelSettings(randomization="published", seed=5))
+    starts = np.array(task.corner)
+    assert np.ptp(starts, axis=0)[:2].min() > 0.05  # they differ
+    assert fold(task, TowelTeacher(8)).all()
+    assert np.linalg.norm(task.corner - task.goal, axis=1).max() < 0.06
+    assert np.linalg.norm(task.corner - starts, axis=1).min() > 0.2
+
+
+def test_what_drops_the_corner_takes_it_again():
+    task, teacher = TowelTask(2, TowelSettings(seed=1)), TowelTeacher(2)
+    dropped = []
+
+    def disturb(step, actions):
+        if not dropped and (teacher.stage == tasks.TRANSPORT).all() and (task.corner[:, 2] > 0.08).all():
+            dropped.append(step)
+            actions[0, 3] = -1
+
+    assert fold(task, teacher, disturb).all() and dropped
+
+
+def test_the_same_seed_is_the_same_episode():
+    runs = []
+    for _ in range(2):
+        task = TowelTask(3, TowelSettings(randomization="published", seed=2, **SHORT))
+        runs.append([task.step(np.full((3, 4), 0.3))[0] for _ in range(3)])
+    assert np.array_equal(*runs)
+    first = task.reset(seed=7)
+    assert np.array_equal(first, task.reset(seed=7)) and not np.array_equal(first, task.reset(seed=8))
+    other = task.reset([1])
+    assert np.array_equal(other[[0, 2]], task.observe()[[0, 2]])
+
+
+def test_bad_actions_are_refused():
+    task = TowelTask(2, TowelSettings(**SHORT))
+    for actions in (np.zeros((2, 3)), np.full((2, 4), np.nan), np.zeros(4)):
+        with pytest.raises(ValueError, match="actions: found"):
+            task.step(actions)
+
+
+def test_gymnasium_sees_the_end_of_an_episode_and_the_start_of_the_next():
+    gymnasium = pytest.importorskip("gymnasium")
+    from flash_sim.gym import TowelVectorEnv
+    env = TowelVectorEnv(3, TowelSettings(**SHORT))
+    assert env.metadata["autoreset_mode"] == gymnasium.vector.AutoresetMode.SAME_STEP
+    observations, infos = env.reset(seed=3)
+    assert env.observation_space.contains(observations) and infos == {}
+    env.task.lengths[1] = 1  # this one ends first
+    env.action_space.seed(0)
+    for step in range(3):
+        last, (observations, rewards, terminated, truncated, infos) = observations, env.step(env.action_space.sample())
+        assert env.observation_space.contains(observations) and rewards.shape == (3,) and not terminated.any()
+        assert truncated.tolist() == [[False] * 3, [False, True, False], [True, False, True]][step]
+        if truncated.any():
+            assert np.array_equal(infos["_final_obs"], truncated)
+            assert np.array_equal(infos["final_obs"][~truncated], observations[~truncated])
+            moved = np.abs(infos["final_obs"] - last)[:, :3].max(axis=1)
+            assert (moved < 0.01).all() and (observations[truncated][:, 2] == 0.15).all()  # the hand is back
+    env.close()
+
+
+def test_gymnasium_may_reset_itself():
+    pytest.importorskip("gymnasium")
+    from flash_sim.gym import TowelVectorEnv
+    env = TowelVectorEnv(2, TowelSettings(**SHORT), autoreset=False)
+    for _ in range(3):
+        *_, truncated, infos = env.step(np.zeros((2, 4)))
+    assert truncated.all() and "final_obs" not in infos
+    env.reset(options={"reset_mask": np.array([True, False])})
+    assert env.task.lengths.tolist() == [0, 3]
+
+
+def test_rsl_rl_trains_on_it():
+    """Two rounds of PPO: the interface is what its runner asks for."""
+    torch = pytest.importorskip("torch")
+    runners = pytest.importorskip("rsl_rl.runners")
+    from flash_sim.rsl import TowelVecEnv
+    env = TowelVecEnv(2, TowelSettings(**SHORT))
+    observations = env.get_observations()
+    assert observations["policy"].shape == (2, 14) and observations["policy"].dtype == torch.float32
+    env.episode_length_buf = torch.tensor([2, 0])
+    observations, rewards, dones, extras = env.step(torch.zeros(2, 4))
+    assert dones.tolist() == [1, 0] and extras["time_outs"].tolist() == [True, False] and rewards.shape == (2,)
+    assert env.episode_length_buf.tolist() == [0, 1]
+    model = {"class_name": "MLPModel", "hidden_dims": [8], "activation": "elu"}
+    runner = runners.OnPolicyRunner(env, {
+        "num_steps_per_env": 4, "save_interval": 100, "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
+        "actor": model | {"distribution_cfg": {"class_name": "GaussianDistribution", "init_std": 1.0}}, "critic": model,
+        "algorithm": {"class_name": "PPO", "num_learning_epochs": 1, "num_mini_batches": 1}}, log_dir=None, device="cpu")
+    runner.learn(2, init_at_random_ep_len=True)
