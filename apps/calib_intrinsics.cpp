@@ -50,6 +50,7 @@ nlohmann::ordered_json result_json(const calib::IntrinsicsEstimate& estimate) {
   }
   json["reprojection_rms_px"] = estimate.rms;
   json["picture_corner_sd_px"] = estimate.corner_sd;
+  json["sd_factor_of_views"] = std::sqrt(estimate.view_factor);
   json["coverage"] = estimate.coverage;
   json["tilt_rad"] = estimate.tilt;
   json["views"] = nlohmann::json::array();

@@ -138,6 +138,12 @@ std::vector<std::string> warnings_of(const IntrinsicsEstimate& estimate, std::si
                        " of the picture: distortion beyond is a guess");
   if (estimate.warp.far_off()) warnings.push_back(warp_sentence(estimate.warp));
   if (estimate.edges && estimate.edges->far_off()) warnings.push_back(edge_sentence(*estimate.edges));
+  constexpr double kDisagree = 4;  // a factor of 2 of the deviations
+  if (estimate.view_factor > kDisagree)
+    warnings.push_back(
+        "views disagree by more than their corners scatter, as where a print bends, light differs or "
+        "the lens is of another model: the stated deviations were raised by a factor of " +
+        data::format_short(std::sqrt(estimate.view_factor)));
   if (views < 8) warnings.push_back("only " + std::to_string(views) + " views; 15 or more are usual");
   return warnings;
 }
@@ -204,6 +210,7 @@ IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<
           std::acos(std::clamp(fit.poses[v].linear().col(2).dot(fit.poses[w].linear().col(2)), -1.0, 1.0)));
   }
   estimate.rms = std::sqrt(squares / corners);
+  estimate.view_factor = fit.view_factor;
   const std::vector<int> used = unknowns(settings.model);
   const auto count = static_cast<Eigen::Index>(used.size());
   const Eigen::MatrixXd variances = fit.covariance.topLeftCorner(count, count);

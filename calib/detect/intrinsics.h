@@ -37,8 +37,9 @@ struct IntrinsicsEstimate {
   double rms = 0;                                      ///< reprojection, 2-D rms per corner [px]
   double corner_sd = 0;  ///< of where the worst corner of the picture is projected, for a fixed ray; at most
                          ///< most_corner_sd [px]
-  double coverage = 0;   ///< share of the picture within the outline of all corners
-  double tilt = 0;       ///< largest angle between the target's normals of two views [rad]
+  double view_factor = 1;  ///< by which views that disagree raised the covariance (LensFit)
+  double coverage = 0;     ///< share of the picture within the outline of all corners
+  double tilt = 0;         ///< largest angle between the target's normals of two views [rad]
   std::vector<IntrinsicsView> views;
   std::vector<std::string> warnings;  ///< what these pictures do not determine
 };

@@ -17,12 +17,18 @@ struct LensFit {
   std::vector<Eigen::Isometry3d> poses;
   double variance = 0;         ///< of a corner's coordinate, from the residuals [px^2]
   Eigen::MatrixXd covariance;  ///< of the unknowns in use, then of the warp and of the offset; poses
-                               ///< marginalised
+                               ///< marginalised, as far as views disagree (view_factor)
+  double view_factor = 1;      ///< by how much it is larger than corners by themselves would make it
 };
 
 /// Least squares of the reprojection from a start that is near, by Gauss and Newton with the poses
 /// eliminated. unknowns: places in `lens` that may change. Warp and offset are held by what is usual
 /// (usual_warp_sd, kUsualEdgeOffset).
+///
+/// Corners of one view share errors that no corner shows: of the print, of light and blur, of the lens's
+/// model. So the covariance is raised by the mean over the unknowns of what leaving out one view at a time
+/// says (the jackknife, of one step of Newton: MacKinnon and White 1985, grouped by views), over what corners
+/// say; by nothing where that is less.
 LensFit fit_lens(LensFit start, const std::vector<int>& unknowns, const Eigen::Matrix3Xd& points,
                  const std::vector<const Observation*>& views);
 
