@@ -14,13 +14,13 @@
 
 namespace flash {
 
-void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options, const char* force) {
+void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options) {
   CLI::App& group = *verb.add_option_group("Common");
   group.add_flag("--json", options.json, "Print the result as JSON on stdout");
   CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
   group.add_flag("--verbose", options.verbose, "Print every notice, and the time of each part")
       ->excludes(quiet);
-  group.add_flag("--force", options.force, force);
+  group.add_flag("--force", options.force, "Overwrite what is there");
   group.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
       ->check(thread_number())
       ->capture_default_str();

@@ -22,10 +22,7 @@ struct CalibCommonOptions {
   int threads = 0;                      ///< 0: one a processor
   const CLI::Option* config = nullptr;  ///< that names a file of options
 };
-void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options,
-                              const char* force = "Overwrite what is there");
-inline constexpr const char* force_covers_calibrations =
-    "Overwrite what is there; use a calibration that handeye ended with exit code 3";
+void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options);
 
 /// Which pictures, poses and intrinsics, and what is to be seen in them.
 struct DatasetChoice {

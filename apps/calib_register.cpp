@@ -11,6 +11,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/doubts_option.h"
 #include "apps/option_checks.h"
 #include "apps/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
@@ -32,6 +33,7 @@ namespace fs = std::filesystem;
 
 struct RegisterOptions {
   CalibCommonOptions common;
+  bool despite_doubts = false;
   std::vector<std::string> calibrations;
   std::vector<std::string> cameras;
   std::string target, setup, cache;
@@ -152,7 +154,7 @@ std::string first_of(const std::vector<std::string>& warnings) {
 std::vector<calib::Extrinsics> load_calibrations(const RegisterOptions& options, Doubts& doubts) {
   std::vector<calib::Extrinsics> calibrations;
   for (const std::string& path : options.calibrations) {
-    calibrations.push_back(calib::load_extrinsics(path, options.common.force));
+    calibrations.push_back(calib::load_extrinsics(path, options.despite_doubts));
     doubts.add(path, calibrations.back().warnings);
   }
   return calibrations;
@@ -374,7 +376,8 @@ void add_register_verb(CLI::App& app, Action& action) {
   verb->add_flag("--no-depth", options->no_depth, "Leave depth pictures out");
   verb->add_option("--cache", options->cache, "Folder that keeps corners found, for the next run");
   verb->add_option("-o,--out", options->out, "File for the cell, JSON");
-  add_calib_common_options(*verb, options->common, force_covers_calibrations);
+  add_calib_common_options(*verb, options->common);
+  add_doubts_option(*verb, options->despite_doubts, "Use a calibration that handeye ended with exit code 3");
   verb->footer(
       "Examples:\n"
       "  flash-calib register left.json right.json --workspace 0.4,0,0.1 -o cell.json\n"

@@ -8,6 +8,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/doubts_option.h"
 #include "apps/result_files.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/cloud_check.h"
@@ -27,6 +28,7 @@ namespace fs = std::filesystem;
 
 struct ValidateOptions {
   CalibCommonOptions common;
+  bool despite_doubts = false;
   DatasetChoice dataset;
   std::string extrinsics;
   std::string lens;  ///< "stated", "solved", a file; empty: they have to agree
@@ -180,7 +182,7 @@ int run_validate(ValidateOptions options) {
   expect_no_camera({.own = own}, options.dataset.camera);
   if (!own.empty()) options.dataset.camera = own;
   if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
-  const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.common.force);
+  const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::Dataset dataset = load_dataset(options.dataset);
   std::vector<std::string> read = files_read(options.dataset, dataset, options.common);
@@ -257,7 +259,8 @@ void add_validate_verb(CLI::App& app, Action& action) {
   verb->add_flag("--refit-target", options->refit_target,
                  "The target stands elsewhere than at the calibration");
   verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");
-  add_calib_common_options(*verb, options->common, force_covers_calibrations);
+  add_calib_common_options(*verb, options->common);
+  add_doubts_option(*verb, options->despite_doubts, "Use a calibration that handeye ended with exit code 3");
   verb->footer(
       "Exit code 3: these views are missed by three times what the calibration states, or it cannot be "
       "used.\n"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <string_view>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "data/procedural_mesh.h"
 #include "data/text.h"
 #include "data/trajectory.h"
+#include "sysid/capture/import_cut.h"
 #include "sysid/capture/segmented_cell.h"
 
 namespace flash {
@@ -27,11 +29,17 @@ data::InputError option_error(const char* option, const std::string& found, cons
 }
 
 std::vector<std::string> files_in(const std::string& folder, const std::vector<std::string>& extensions,
-                                  const char* option) {
+                                  const char* what) {
   std::vector<std::string> files = data::files_in_order(folder, extensions);
-  if (files.empty())
-    throw data::InputError(folder + ": found no " + extensions.front() + " files for --" + option);
-  return files;
+  if (!files.empty()) return files;
+  namespace fs = std::filesystem;
+  std::error_code unknown;
+  std::string hint;
+  for (const char* name : {"frames", "clouds", "depth"})
+    if (fs::is_directory(fs::path(folder) / name, unknown))
+      hint = ": is it " + (fs::path(folder) / name).string() + "?";
+  throw data::InputError(folder + ": found no " + what + ", expected a folder of " + extensions.front() +
+                         " or " + extensions.back() + " files" + hint);
 }
 
 void parse_range(const std::string& range, const char* option, int axis, data::CropBox& crop) {
@@ -92,12 +100,13 @@ bool are_equal(const std::vector<double>& a, const std::vector<double>& b) {
 
 /// Takes what `segment` knows of the cell for what is not given, and compares it with what is.
 void take_segmented(const std::string& file, sysid::ImportSettings& settings) {
-  constexpr double kTable = 0.02;  // by which two heights of one table differ at most [m]
+  constexpr double kTable = 0.005;  // to which depth cameras and robots know the height of a table [m]
   const sysid::SegmentedCell cell = sysid::load_segmented_cell(file);
   const auto differs = [&](const char* option, const std::string& how) {
     const std::string text = std::string(option) + ": " + how + " " + file;
     if (!settings.accept_unusable)
-      throw data::InputError(text + ", with which the clouds were segmented; --force takes it as it is");
+      throw data::InputError(text +
+                             ", with which the clouds were segmented; --despite-doubts takes it as it is");
     settings.taken.push_back("warning: " + text);
   };
   std::vector<std::string> taken;
@@ -124,9 +133,16 @@ void take_segmented(const std::string& file, sysid::ImportSettings& settings) {
     if (!settings.table_height) {
       settings.table_height = height;
       taken.push_back("the table's height, " + data::format_short(std::round(1e4 * height) / 1e4) + " m,");
-    } else if (std::abs(*settings.table_height - height) > kTable) {
-      differs("--table-z", "found " + data::format_short(*settings.table_height) + " m, expected " +
-                               data::format_short(std::round(1e4 * height) / 1e4) + " m, as in");
+    } else if (const double off = std::abs(*settings.table_height - height); off > kTable) {
+      const std::string how = "found " + data::format_short(*settings.table_height) + " m, expected " +
+                              data::format_short(std::round(1e4 * height) / 1e4) + " m, as in";
+      // The camera, by which it was found, may be off the robot by so much.
+      const double allowed = kTable + settings.nuisance.offset.z() + settings.nuisance.table_height;
+      if (off > allowed)
+        differs("--table-z", how);
+      else
+        settings.taken.push_back("warning: --table-z: " + how + " " + file +
+                                 ": the bounds on offset and table allow it");
     }
   }
   settings.cameras = cell.cameras;
@@ -179,6 +195,8 @@ data::CropBox parse_crop(const std::array<std::string, 3>& ranges) { return pars
 void read_options(const ImportOptions& options, sysid::ImportSettings& settings) {
   const std::string segmented =
       options.clouds.empty() ? std::string() : sysid::segmented_cell_of(options.clouds);
+  if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");
+  if (!options.depth.empty()) settings.depth = files_in(options.depth, data::depth_endings(), "depth images");
   if (options.trajectory.empty() && segmented.empty())
     throw data::InputError("import: expected --trajectory, or --markers in place of clouds");
   if (options.mesh.empty()) throw data::InputError("import: expected --mesh, as sheet:0.3x0.24:0.01");
@@ -190,8 +208,6 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
   settings.crop = parse_crop(options.crop);
   if (options.clouds.empty() == options.depth.empty())
     throw data::InputError("import: expected either a folder of clouds or --depth");
-  if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");
-  if (!options.depth.empty()) settings.depth = files_in(options.depth, data::depth_endings(), "depth");
   if (!options.trajectory.empty()) {
     settings.trajectory = load_gripper(options.trajectory);
     settings.trajectory_path = options.trajectory;
@@ -204,6 +220,7 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
         !gap.empty())
       throw data::InputError("--times: found none, but " + gap +
                              ": expected a CSV file with the time of each frame that is there");
+  sysid::cut(options.from, options.until, settings);
   if (!options.depth.empty() && settings.extrinsics.empty())
     throw data::InputError("import: --depth needs --extrinsics, and --intrinsics where these hold no lens");
   std::string own;

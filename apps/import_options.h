@@ -17,7 +17,8 @@ struct ImportOptions {
   std::string mesh;              ///< mesh spec or file
   std::string grasp = "corner";  ///< as parse_grasp reads it
   std::optional<double> within;  ///< of the grasp [m]; empty: 0.02
-  std::array<std::string, 3> crop;  ///< along x, y and z "LOW:HIGH" [m], either side may be empty
+  std::optional<double> from, until;  ///< by the clock of the recording [s]; empty: all of it
+  std::array<std::string, 3> crop;    ///< along x, y and z "LOW:HIGH" [m], either side may be empty
 };
 
 /// "corner", "corner:I,J", "vertices:A,B,..." or "position": what is near the gripper. Throws

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/command_line.h"
+#include "apps/doubts_option.h"
 #include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
 #include "data/atomic_file.h"
@@ -34,7 +35,7 @@ struct MeshOptions {
   data::DepthFrames frames;
   std::string lens;  ///< of depth frames: "stated", "solved", a file; empty: they have to agree
   double scale = 1;
-  bool points = false, tets = false, weld = false, json = false, force = false;
+  bool points = false, tets = false, weld = false, json = false, force = false, despite_doubts = false;
 };
 
 std::string millimetres(double metres) { return data::format_short(1000 * metres) + " mm"; }
@@ -51,7 +52,7 @@ data::Geometry load(const MeshOptions& options, std::size_t& left_out, std::stri
   if (!std::filesystem::is_directory(options.input))
     scan = data::load_scan(options.input, left_out);
   else if (are_depth_frames(options))
-    scan.points = data::fused_depth(options.frames, options.force, notice);
+    scan.points = data::fused_depth(options.frames, options.despite_doubts, notice);
   else
     scan.points = data::fused_clouds(options.input, left_out);
   scan.points *= options.scale;
@@ -61,11 +62,11 @@ data::Geometry load(const MeshOptions& options, std::size_t& left_out, std::stri
 
 /// A sheet whose triangles lie on each other has no rest shape.
 void check_turned_over(const MeshOptions& options, const data::FlatShape& flat, Eigen::Index triangles) {
-  if (flat.inverted == 0 || options.force) return;
-  throw data::InputError(options.input + ": does not lie flat: found " +
-                         data::format_count(std::size_t(flat.inverted)) + " of " +
-                         data::format_count(std::size_t(triangles)) +
-                         " triangles turned over, expected none; --force writes the shape all the same");
+  if (flat.inverted == 0 || options.despite_doubts) return;
+  throw data::InputError(
+      options.input + ": does not lie flat: found " + data::format_count(std::size_t(flat.inverted)) +
+      " of " + data::format_count(std::size_t(triangles)) +
+      " triangles turned over, expected none; --despite-doubts writes the shape all the same");
 }
 
 std::vector<std::string> warnings_of(const data::ScannedSurface& sheet, std::size_t left_out) {
@@ -282,7 +283,7 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       "--flat\n"
       "lays the sheet out: the rest shape of its asset. Exit code 3: it does not develop, more than 1 % "
       "rms.\n"
-      "Exit code 2: triangles of the flat shape are turned over; --force writes it.\n"
+      "Exit code 2: triangles of the flat shape are turned over; --despite-doubts writes it.\n"
       "Examples:\n"
       "  flash-sim mesh scan.ply --edge 0.01 -o cloth.obj --flat cloth_flat.obj\n"
       "  flash-sim mesh depth --intrinsics camera_info.yaml --poses camera.tum -o cloth.obj\n"
@@ -341,10 +342,11 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       ->excludes(smoothing)
       ->excludes(holes);
   verb.add_flag("--json", options->json, "Print what was made as JSON on stdout");
-  verb.add_flag(
-      "--force", options->force,
-      "Write over what is there, and a flat shape with triangles turned over; take a calibration that "
-      "said it cannot be used");
+  verb.add_flag("--force", options->force, "Write over what is there");
+  add_doubts_option(
+      verb, options->despite_doubts,
+      "Write a flat shape with triangles turned over; take a calibration that said it cannot be "
+      "used");
   verb.callback([&action, options] {
     options->frames.folder = options->input;
     action = [options] { return mesh(*options); };

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/doubts_option.h"
 #include "apps/import_options.h"
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
@@ -27,7 +28,7 @@ struct ImportVerbOptions {
   sysid::ImportSettings settings;
   std::string offset;
   std::string shape = "clamp", tool_at = "corner";
-  double within = 0, table_height = 0, heading_degrees = 0;
+  double within = 0, table_height = 0, heading_degrees = 0, from = 0, until = 0;
   sysid::TrackImportSettings tracks;
   std::array<std::string, 3> clamp;  // along x, y and z "LOW:HIGH" [m]
   std::string gravity;
@@ -81,9 +82,10 @@ int tell_import(const data::Recording& recording, const std::string& out, const 
 
 // A part that is clamped, from the tracks of its markers.
 int import_markers(const CLI::App& verb, ImportVerbOptions options) {
-  for (const char* name : {"--times", "--grasp", "--grasp-within", "--tool-at", "--grasp-shape", "--crop-x",
-                           "--crop-y", "--crop-z", "--table-z", "--heading", "--start-yaw-bound",
-                           "--table-height-bound", "--offset-bound", "--yaw-bound", "--time-offset-bound"})
+  for (const char* name :
+       {"--times", "--from", "--until", "--grasp", "--grasp-within", "--tool-at", "--grasp-shape", "--crop-x",
+        "--crop-y", "--crop-z", "--table-z", "--heading", "--start-yaw-bound", "--table-height-bound",
+        "--offset-bound", "--yaw-bound", "--time-offset-bound"})
     if (verb.count(name) > 0)
       throw data::InputError(std::string(name) +
                              ": found --markers, expected clouds or depth images beside it");
@@ -107,11 +109,13 @@ int import_markers(const CLI::App& verb, ImportVerbOptions options) {
 int run_import(const CLI::App& verb, ImportVerbOptions options) {
   if (!options.tracks.tracks.empty()) return import_markers(verb, std::move(options));
   sysid::ImportSettings& settings = options.settings;
-  settings.overwrite = settings.accept_unusable = options.common.force;
+  settings.overwrite = options.common.force;
   if (!options.offset.empty()) settings.nuisance.offset = parse_bounds(options.offset);
   settings.tool_at_patch = options.tool_at == "patch";
   settings.shape = data::parse_grasp_shape(options.shape).value_or(settings.shape);
   if (verb.count("--grasp-within") > 0) options.texts.within = options.within;
+  if (verb.count("--from") > 0) options.texts.from = options.from;
+  if (verb.count("--until") > 0) options.texts.until = options.until;
   if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
   if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;
   read_options(options.texts, settings);
@@ -176,6 +180,12 @@ void add_import_verb(CLI::App& app, Action& action) {
       "--times", texts.times,
       "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it as the clouds "
       "were segmented, else rate:10");
+  verb->add_option("--from", options->from,
+                   "Leave out what was recorded before, as the approach; by the clock of the recording [s]")
+      ->check(any_number());
+  verb->add_option("--until", options->until,
+                   "Leave out what was recorded after, as the retreat; by the clock of the recording [s]")
+      ->check(any_number());
   verb->add_option("--mesh", texts.mesh,
                    "Mesh of the sheet, sheet:WIDTHxHEIGHT:CELL [m], of the part with --markers, as "
                    "box:LENGTHxWIDTHxHEIGHT:CELL, or a file; from corner 0,0 or 1,1, seen from "
@@ -221,7 +231,11 @@ void add_import_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--name", settings.name, "Name of the recording; without it that of the folder");
   verb->add_option("-o,--out", settings.out, "Folder of the recording")->required();
-  add_common_options(*verb, options->common, force_covers_calibrations);
+  add_common_options(*verb, options->common);
+  add_doubts_option(
+      *verb, settings.accept_unusable,
+      "Go on, and warn, where what is given contradicts itself, is unusual, or is a calibration "
+      "that flash-calib ended with exit code 3");
   verb->footer(
       "Example:\n"
       "  flash-sysid import clouds --trajectory tcp.tum --times rate:10 --mesh sheet:0.278x0.278:0.01 "

@@ -23,10 +23,7 @@ struct CommonOptions {
   std::string device = "auto";
   int threads = 0;  ///< 0: one a processor
 };
-inline constexpr const char* force_overwrites = "Overwrite what is there";
-inline constexpr const char* force_covers_calibrations =
-    "Overwrite what is there; use a calibration that flash-calib ended with exit code 3";
-void add_common_options(CLI::App& verb, CommonOptions& options, const char* force = force_overwrites);
+void add_common_options(CLI::App& verb, CommonOptions& options);
 void add_seed_option(CLI::App& verb, CommonOptions& options);    ///< of verbs that draw at random
 void add_device_option(CLI::App& verb, CommonOptions& options);  ///< of verbs that simulate
 void add_cpu_option(CLI::App& verb, CommonOptions& options);     ///< of those that no device simulates for

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/doubts_option.h"
 #include "apps/frame_times.h"
 #include "apps/import_options.h"
 #include "apps/option_checks.h"
@@ -36,7 +37,7 @@ struct SegmentOptions {
   std::string trajectory, times;
   double table_height = 0;
   std::array<std::string, 3> crop;
-  bool no_table = false;
+  bool no_table = false, despite_doubts = false;
   sysid::SegmentFolderSettings settings;
   std::string out;
 };
@@ -76,7 +77,7 @@ std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
     files.extrinsics = of_view(options.extrinsics, view, count, false, "--extrinsics", none);
     const double scale = of_view(options.depth_scales, view, count, true, "--depth-scale", 0.0);
     if (scale > 0) files.depth_scale = scale;
-    files.accept_unusable = options.common.force;
+    files.accept_unusable = options.despite_doubts;
     views.push_back(sysid::open_raw_view(options.views[view], files));
   }
   const bool clouds = std::none_of(views.begin(), views.end(), [](const auto& view) { return view.camera; });
@@ -132,11 +133,14 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
   }
   data::check_folder_free(options.out, options.common.force);
   check_places(views, options.out);
-  settings.accept_fault = options.common.force;
+  settings.accept_fault = options.despite_doubts;
   settings.told = [&](const std::string& text) { say(options.common, text); };
   const sysid::SegmentedFolder segmented =
       sysid::segment_folder(views, times_of(options, views), settings, options.out);
   for (const std::string& warning : segmented.warnings) warn(warning);  // those of the cameras too
+  if (options.trajectory.empty())
+    say(options.common,
+        "no --trajectory: where a gripper or an arm is in view, it is not told from cloth and is kept");
 
   std::size_t points = 0;
   for (const sysid::Segmentation& frame : segmented.frames)
@@ -226,7 +230,10 @@ void add_segment_verb(CLI::App& app, Action& action) {
           ->check(number_between(-20, 20));
   verb->add_flag("--no-table", options->no_table, "There is no table in view")->excludes(height);
   verb->add_option("-o,--out", options->out, "Folder for frames/ and segment.svg")->required();
-  add_common_options(*verb, options->common, force_covers_calibrations);
+  add_common_options(*verb, options->common);
+  add_doubts_option(*verb, options->despite_doubts,
+                    "Go on, and warn, where cameras, table and gripper are not of one cell, or with a "
+                    "calibration that flash-calib ended with exit code 3");
   verb->footer(
       "Example:\n  flash-sysid segment raw/camera --trajectory gripper.tum --times rate:10 -o segmented");
   verb->callback(

@@ -130,7 +130,7 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
   if (!pose.usable && !accept_unusable)
     throw file.error("exit_code", "0: flash-calib handeye ended with an answer that cannot be used" +
                                       (pose.warnings.empty() ? "" : " (" + pose.warnings.front() + ")") +
-                                      "; calibrate again, or take it as it is with --force");
+                                      "; calibrate again, or take it as it is with --despite-doubts");
   return pose;
 }
 

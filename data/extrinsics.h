@@ -26,8 +26,8 @@ struct CameraPose {
   bool usable = true;                           ///< false: it ended with exit code 3
 };
 
-/// `accept_unusable` is what --force says. Without it an answer that cannot be used is refused. Throws
-/// InputError naming file, field, what was found and what was expected.
+/// `accept_unusable` is what --despite-doubts says. Without it an answer that cannot be used is refused.
+/// Throws InputError naming file, field, what was found and what was expected.
 CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable);
 
 /// T_base_camera of a camera that stands still: such a file; a trajectory or list of poses (load_pose_list),

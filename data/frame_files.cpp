@@ -155,19 +155,25 @@ std::vector<double> load_frame_times(const std::string& path, std::size_t frames
 std::vector<std::string> find_jumps(const Trajectory& trajectory, const std::string& path) {
   constexpr double fastest = 5;      // no arm moves cloth faster [m/s]
   constexpr double shortest = 0.02;  // shorter ones are rounding of close stamps [m]
-  std::size_t count = 0, first = 0;
-  double farthest = 0;
+  constexpr double longest = 20;     // no arm reaches farther [m]
+  std::size_t count = 0, first = 0, in_millimetres = 0;
+  double farthest = 0, reach = 0;
   for (std::size_t i = 1; i < trajectory.poses.size(); ++i) {
     const double distance =
         (trajectory.poses[i].translation() - trajectory.poses[i - 1].translation()).norm();
-    if (distance < shortest || distance < fastest * (trajectory.times[i] - trajectory.times[i - 1])) continue;
+    reach = std::max(reach, trajectory.poses[i].translation().norm());
+    const double duration = trajectory.times[i] - trajectory.times[i - 1];
+    in_millimetres += 1e-3 * distance >= shortest && 1e-3 * distance >= fastest * duration;
+    if (distance < shortest || distance < fastest * duration) continue;
     if (count++ == 0) first = i;
     farthest = std::max(farthest, distance);
   }
   if (count == 0) return {};
   return {path + ": " + (count == 1 ? "a jump" : std::to_string(count) + " jumps") + " of up to " +
           format_short(farthest) + " m from one pose to the next, faster than " + format_short(fastest) +
-          " m/s; first after pose " + std::to_string(first) + ": is the trajectory of one piece?"};
+          " m/s; first after pose " + std::to_string(first) +
+          (in_millimetres == 0 && reach > longest ? ": are the poses in millimetres? Expected metres"
+                                                  : ": is the trajectory of one piece?")};
 }
 
 }  // namespace flash::data

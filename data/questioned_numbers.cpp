@@ -1,23 +1,12 @@
 #include "data/questioned_numbers.h"
 
-#include <vector>
-
 #include "data/text.h"
 
 namespace flash::data {
-namespace {
 
-/// A number that a thing has.
-struct Usual {
-  std::string name;
-  double value, low, high;
-  std::string unit, below, above;  ///< what may be meant where it is less, or more
-};
-
-/// One notice of all numbers that things rarely have, as units were mistaken; empty where there are none.
-std::string question_of(const std::string& source, const std::vector<Usual>& numbers) {
+std::string questioned(const std::string& source, const std::vector<UsualNumber>& numbers) {
   std::string text;
-  for (const Usual& each : numbers) {
+  for (const UsualNumber& each : numbers) {
     const bool low = each.value < each.low;
     if (!low && each.value <= each.high) continue;
     text += (text.empty() ? "" : "; ") + each.name + " found " + format_short(each.value) + ' ' + each.unit +
@@ -27,11 +16,9 @@ std::string question_of(const std::string& source, const std::vector<Usual>& num
   return text.empty() ? "" : source + ": unusual, is the unit right? " + text;
 }
 
-}  // namespace
-
 std::string questioned(const Asset& asset, const SheetMaterial& m) {
   constexpr double kSoftest = 1e3, kStiffest = 1e12;  // [Pa]
-  std::vector<Usual> numbers = {
+  std::vector<UsualNumber> numbers = {
       {"areal density", m.areal_density, 0.005, 20, "kg/m^2", "", " (150 g/m^2 are 0.15)"}};
   if (asset.thickness)
     numbers.push_back({"young with a thickness", asset.young, kSoftest, kStiffest, "Pa",
@@ -39,12 +26,12 @@ std::string questioned(const Asset& asset, const SheetMaterial& m) {
   else
     numbers.push_back(
         {"young without a thickness", asset.young, 0.1, 1e8, "N/m", "", " (E in Pa needs a thickness)"});
-  return question_of(asset.source, numbers);
+  return questioned(asset.source, numbers);
 }
 
 std::string questioned(const Asset& asset, const SolidMaterial& m) {
-  return question_of(asset.source, {{"density", m.density, 10, 25000, "kg/m^3", " (1 g/cm^3 are 1000)", ""},
-                                    {"young", m.youngs_modulus, 100, 1e12, "Pa", " (1 MPa are 1e6)", ""}});
+  return questioned(asset.source, {{"density", m.density, 10, 25000, "kg/m^3", " (1 g/cm^3 are 1000)", ""},
+                                   {"young", m.youngs_modulus, 100, 1e12, "Pa", " (1 MPa are 1e6)", ""}});
 }
 
 }  // namespace flash::data

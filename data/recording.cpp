@@ -301,6 +301,10 @@ void count_from_start(Recording& recording) {
   }
 }
 
+std::string named_gripper(const RecordedGrasp& grasp) {
+  return grasp.gripper == "gripper" ? "the gripper" : "gripper " + grasp.gripper;
+}
+
 /// Only grasps that act on the start shape can be checked before anything has moved.
 void check_grasps(const Recording& recording) {
   double earliest = kInfinity;
@@ -317,7 +321,7 @@ void check_grasps(const Recording& recording) {
     if (distance > (grasp.select.within + offset) * (1 + 1e-9))
       throw input_error(
           recording.source, "grasps[" + std::to_string(g) + "]",
-          "at t = " + format_clock(recording.origin + grasp.from) + " s gripper " + grasp.gripper + " is " +
+          "at t = " + format_clock(recording.origin + grasp.from) + " s " + named_gripper(grasp) + " is " +
               format_short(distance) + " m from the vertices it should hold, expected at most within " +
               format_short(grasp.select.within) + " m plus nuisance.offset_m " + format_short(offset) +
               " m: check object.start, select and the frame of the trajectory");
@@ -434,8 +438,8 @@ std::vector<int> select_vertices(const Recording& recording, const RecordedGrasp
     throw input_error(recording.source, "grasps", "no vertex lies in select.box");
   if (selected.empty())
     throw input_error(recording.source, "grasps",
-                      "no vertex lies within " + format_short(select.within) +
-                          " m of the place that gripper " + grasp.gripper + " grasps");
+                      "no vertex lies within " + format_short(select.within) + " m of the place that " +
+                          named_gripper(grasp) + " grasps");
   return selected;
 }
 

@@ -57,7 +57,7 @@ struct Extrinsics {
 Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs);
 
 /// Throws data::InputError naming file, field, what was found and what was expected; also where the
-/// calibration ended with exit code 3, unless `accept_unusable`, which is what --force says.
+/// calibration ended with exit code 3, unless `accept_unusable`, which is what --despite-doubts says.
 Extrinsics load_extrinsics(const std::string& path, bool accept_unusable = false);
 
 }  // namespace flash::calib

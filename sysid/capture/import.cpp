@@ -20,15 +20,13 @@
 #include "sysid/capture/clocks.h"
 #include "sysid/capture/import_checks.h"
 #include "sysid/capture/import_picture.h"
-#include "sysid/capture/lying_sheet.h"
+#include "sysid/capture/lying_checks.h"
 #include "sysid/replay/grasp_mesh.h"
 
 namespace flash::sysid {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kRate = 10;  // frames a second, where nothing else is said
 
 /// Horizontal direction from the gripper's start to the middle of the cloth: the median over the frames,
 /// which neither stray clusters nor frames that show a rim only can turn far.
@@ -66,63 +64,6 @@ Eigen::Isometry3d start_pose(const data::Points& rest, const std::array<int, 2>&
   pose.translation() =
       Eigen::Vector3d(gripper.x(), gripper.y(), table_height) - pose.linear() * held.transpose();
   return pose;
-}
-
-/// What the clouds of the gripper's first stand show of the sheet that still lies, seen from above; thinned.
-std::vector<Eigen::Vector2d> lying_points(const data::Recording& recording,
-                                          const std::vector<data::Keyframe>& keyframes) {
-  constexpr double still = 0.005;  // the gripper has not moved farther [m]
-  constexpr std::size_t most = 1500;
-  const data::Trajectory& trajectory = recording.trajectories.at("gripper");
-  std::vector<Eigen::Vector2d> points;
-  for (const data::Keyframe& keyframe : keyframes) {
-    const Eigen::Vector3d moved =
-        data::pose_at(trajectory, keyframe.time).translation() - trajectory.poses.front().translation();
-    if (moved.norm() > still) break;
-    for (Eigen::Index i = 0; i < keyframe.cloud.rows(); ++i)
-      points.emplace_back(keyframe.cloud.row(i).head<2>().transpose());
-  }
-  const std::size_t step = 1 + points.size() / most;
-  std::vector<Eigen::Vector2d> thinned;
-  for (std::size_t i = 0; i < points.size(); i += step) thinned.push_back(points[i]);
-  return thinned;
-}
-
-/// Whether the first clouds, of a sheet that still lies, fit it better with its sides changed over or turned.
-std::vector<std::string> compare_sides(const data::Recording& recording,
-                                       const std::vector<data::Keyframe>& keyframes, double heading) {
-  const data::Points& rest = recording.mesh.vertices;
-  const std::array<int, 2> corner = *recording.grasps[0].select.corner;
-  const Eigen::RowVector3d size = rest.colwise().maxCoeff() - rest.colwise().minCoeff();
-  const std::vector<Eigen::Vector2d> points = lying_points(recording, keyframes);
-  if (!recording.mesh_spec.starts_with("sheet:")) return {};
-  constexpr std::size_t fewest = 50;  // else it is stray points that show
-  if (points.size() < fewest && size.x() == size.y()) return {};
-  if (points.size() < fewest)
-    return {
-        "import: --mesh: no cloud shows the sheet before the gripper moves, so its sides cannot be "
-        "checked: " +
-        data::format_short(corner[0] == corner[1] ? size.x() : size.y()) +
-        " m are on the right hand, from the grasped corner and seen from above"};
-  LyingSheet given{(recording.base_from_object * corner_of(rest, corner).transpose()).head<2>(), size.x(),
-                   size.y(), heading};
-  if (corner[0] != corner[1]) std::swap(given.right, given.left);
-  LyingSheet swapped = given;
-  std::swap(swapped.right, swapped.left);
-  const LyingSheet fitted = turned_to(given, points);
-  const double as_given = distance_to(fitted, points);
-  const double as_swapped = distance_to(turned_to(swapped, points), points);
-  constexpr double clear = 0.002;  // below it, noise decides [m]
-  if (as_swapped < 0.5 * as_given && as_given - as_swapped > clear)
-    return {"import: warning: --mesh: with the sides changed over, " + data::format_short(size.y()) + "x" +
-            data::format_short(size.x()) + ", the sheet is " + data::format_short(1000 * as_swapped) +
-            " mm from what the first clouds show of it, as given " + data::format_short(1000 * as_given) +
-            " mm: change the sides over, or name another corner with --grasp corner:I,J"};
-  constexpr double good = 0.008;  // what a cloud of 10 mm between its points is from its sheet [m]
-  const double turn = (fitted.heading - heading) * 180 / std::numbers::pi;
-  if (as_given > good || std::abs(turn) < 1.5) return {};
-  return {"import: what the first clouds show of the lying sheet fits best with --heading " +
-          data::format_short(fitted.heading * 180 / std::numbers::pi)};
 }
 
 /// Loads the recording as its users will, which checks it; what is wrong is not yet in a file of the user.
@@ -172,7 +113,8 @@ void import_frames(const ImportSettings& settings, data::Recording& recording) {
                            std::to_string(frames.size()) + ", one a frame");
   for (std::size_t i = 0; i < frames.size(); ++i) {
     data::RecordedKeyframe keyframe;
-    keyframe.time = settings.times.empty() ? static_cast<double>(i) / kRate : settings.times[i];
+    keyframe.time = settings.times.empty() ? static_cast<double>(i) / ImportSettings::frames_per_second
+                                           : settings.times[i];
     (depth ? keyframe.depth : keyframe.cloud) = frames[i];
     if (!settings.masks.empty()) keyframe.mask = data::mask_of(settings.masks, frames[i]);
     recording.keyframes.push_back(keyframe);
@@ -258,6 +200,7 @@ data::Recording import_recording(const ImportSettings& settings) {
   recording.trajectories["gripper"] = trajectory;
   recording.trajectory_paths["gripper"] = settings.trajectory_path;
 
+  check_patch(recording);
   import_frames(settings, recording);
   recording.grasps[0].from = grasp_time(trajectory, recording.keyframes.front().time);
   std::vector<double> times;
@@ -265,6 +208,9 @@ data::Recording import_recording(const ImportSettings& settings) {
   std::vector<std::string> notices = recording.notices;
   for (const std::string& line : compare_clocks(times, trajectory, settings.trajectory_path))
     notices.push_back(line);
+
+  if (const std::string question = questioned_settings(recording); !question.empty())
+    notices.push_back("import: warning: " + question.substr(question.find(": ") + 2));
 
   std::vector<std::string> guesses;
   if (settings.times.empty()) guesses.push_back("10 frames a second (--times)");
@@ -288,13 +234,16 @@ data::Recording import_recording(const ImportSettings& settings) {
   const auto& corner = recording.grasps[0].select.corner;
   if (corner) recording.start.rowwise() += Eigen::RowVector3d(gripper.x(), gripper.y(), table_height);
   const std::vector<data::Keyframe> keyframes = data::load_keyframes(recording, notices);
+  std::optional<LyingSheet> sheet;
   if (corner) {
     const data::Points& rest = recording.mesh.vertices;
     Eigen::RowVector3d held = corner_of(rest, *corner);
     if (settings.tool_at_patch) held = patch_middle(recording, recording.grasps[0]);
     const double heading = settings.heading.value_or(heading_of_clouds(keyframes, gripper));
     recording.base_from_object = start_pose(rest, *corner, held, gripper, table_height, heading);
-    for (const std::string& line : compare_sides(recording, keyframes, heading)) notices.push_back(line);
+    sheet = stated_sheet(recording, heading);
+    if (sheet)
+      for (const std::string& line : compare_sides(recording, keyframes, *sheet)) notices.push_back(line);
     if (!settings.heading)
       guesses.push_back("the sheet's diagonal points to " +
                         data::format_short(heading * 180 / std::numbers::pi) +
@@ -305,16 +254,21 @@ data::Recording import_recording(const ImportSettings& settings) {
                       " under the gripper (--tool-at)");
   }
 
-  const std::string doubt =
-      corner && !settings.table_height
-          ? "; or the table's height, guessed as " + data::format_short(table_height) +
-                " m from the gripper's start and the crop, is wrong: give it as --table-z"
-          : "";
+  std::string doubt = corner && !settings.table_height
+                          ? "; or the table's height, guessed as " + data::format_short(table_height) +
+                                " m from the gripper's start and the crop, is wrong: give it as --table-z"
+                          : "";
+  if (const std::string approach = approach_of(trajectory); corner && !approach.empty())
+    doubt += "; " + approach;
   data::StagedFolder staged(settings.out);
   copy_files(staged.path(), recording);
   check_as_file(recording, (fs::path(staged.path()) / "recording.json").string(), doubt);
-  for (const std::string& text : contradictions(recording, keyframes)) {
-    if (!settings.accept_unusable) throw data::InputError("import: " + text + " --force takes it as it is");
+  std::vector<std::string> found = contradictions(recording, keyframes);
+  if (const std::string beside = sheet ? beside_the_sheet(recording, keyframes, *sheet) : ""; !beside.empty())
+    settings.heading ? found.push_back(beside) : notices.push_back("import: warning: " + beside);
+  for (const std::string& text : found) {
+    if (!settings.accept_unusable)
+      throw data::InputError("import: " + text + " --despite-doubts takes it as it is");
     notices.push_back("import: warning: " + text);
   }
   if (!settings.asset.empty()) {

@@ -13,6 +13,8 @@ namespace flash::sysid {
 
 /// What observations need to become a recording.
 struct ImportSettings {
+  static constexpr double frames_per_second = 10;  ///< where nothing else is said
+
   std::vector<std::string> clouds;  ///< .ply or .pcd in the base frame, in order of time; or
   std::vector<std::string> depth;   ///< 16-bit .png in the camera frame, in order of time, with
   std::string masks;                ///< a folder of masks of the same names, may be empty
@@ -21,7 +23,7 @@ struct ImportSettings {
   std::string extrinsics;      ///< T_base_camera: extrinsics JSON, or a TUM file whose first pose counts
   double depth_scale = 0.001;  ///< [m] a count
 
-  std::vector<double> times;    ///< one a frame, increasing [s]; empty: 10 a second, and a notice
+  std::vector<double> times;    ///< one a frame, increasing [s]; empty: frames_per_second, and a notice
   data::Trajectory trajectory;  ///< T_base_gripper, two poses or more
   std::string trajectory_path;  ///< where it stands, for messages
   std::string mesh_spec;        ///< mesh spec or file that `mesh` came from

@@ -1,15 +1,19 @@
 #include "sysid/capture/import_checks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
+#include "data/error.h"
+#include "data/questioned_numbers.h"
 #include "data/text.h"
 
 namespace flash::sysid {
 namespace {
 
 constexpr double kRegistration = 0.15;  // from a gripper to the nearest point that is seen, at most [m]
+constexpr double kFarthest = 20;        // beyond it, millimetres were given for metres [m]
 constexpr double kStretch = 0.05;       // by which calibrated cameras and robots are off at most [m]
 
 std::string metres(double length) { return data::format_short(std::round(1000 * length) / 1000) + " m"; }
@@ -75,11 +79,13 @@ std::vector<std::string> contradictions(const data::Recording& recording,
     if (cloud.lowest > kOffTable) off_table.push_back(cloud.farthest);
   }
   if (const double gap = quantile(nearest, 0.5); gap > kRegistration + offset)
-    found.push_back("the gripper is " + metres(gap) +
-                    " from the nearest point of the cloth, in the median frame, expected at most " +
-                    metres(kRegistration + offset) +
-                    ": is the trajectory that of the tool centre point in the frame of the clouds, and does "
-                    "the recording hold the lift alone?");
+    found.push_back(
+        "the gripper is " + metres(gap) +
+        " from the nearest point of the cloth, in the median frame, expected at most " +
+        metres(kRegistration + offset) +
+        (1e-3 * gap < diagonal && gap > kFarthest ? ": are the poses of the gripper in millimetres?" : "") +
+        ": is the trajectory that of the tool centre point in the frame of the clouds, and does "
+        "the recording hold the lift alone?");
   if (const double reach = quantile(farthest, 0.9); reach > diagonal + kStretch + offset)
     found.push_back("the clouds reach " + metres(reach) + " from the gripper, and a sheet of " + sheet +
                     " at most " + metres(diagonal) +
@@ -94,27 +100,73 @@ std::vector<std::string> contradictions(const data::Recording& recording,
   const data::Trajectory& trajectory = recording.trajectories.at(recording.grasps.front().gripper);
   const Eigen::Vector3d start = trajectory.poses.front().translation();
   const double height = start.z() - recording.table_point.z();
+  const std::string approach = approach_of(trajectory);
   if (height > kHighest + recording.nuisance.offset.z())
     found.push_back("the gripper starts " + metres(height) +
                     " above the table on which the sheet lies in its fingers, expected at most " +
                     metres(kHighest + recording.nuisance.offset.z()) +
                     ": is the trajectory that of the flange, or does it begin before the grasp? (--table-z, "
                     "where the table is not at " +
-                    metres(recording.table_point.z()) + ")");
+                    metres(recording.table_point.z()) + ")" + (approach.empty() ? "" : " " + approach + "."));
   const Eigen::RowVector3d low = recording.mesh.vertices.colwise().minCoeff();
   const Eigen::Vector3d middle = recording.base_from_object * (low + 0.5 * size).transpose();
   const Eigen::Vector2d stated = (middle - start).head<2>();
+  const std::array<int, 2> corner = *recording.grasps.front().select.corner;
+  const Eigen::Vector3d across((corner[0] == 0 ? 1 : -1) * size.x(), (corner[1] == 0 ? 1 : -1) * size.y(), 0);
+  const Eigen::Vector3d diagonal_way = recording.base_from_object.linear() * across;
   std::vector<double> along;
   for (const HeldCloud& cloud : held)
     if (cloud.moved < 0.25 * diagonal) along.push_back(stated.normalized().dot(cloud.middle));
   if (along.size() >= kFewest)
     if (const double way = quantile(along, 0.5); way < -(0.1 * diagonal + offset))
-      found.push_back(
-          "the clouds are " + metres(-way) +
-          " behind the gripper's start, seen along the sheet as --heading " +
-          data::format_short(std::round(std::atan2(stated.y(), stated.x()) * 180 / std::numbers::pi)) +
-          " has it: is it turned by half a turn?");
+      found.push_back("the clouds are " + metres(-way) +
+                      " behind the gripper's start, seen along the sheet as --heading " +
+                      data::format_short(std::round(std::atan2(diagonal_way.y(), diagonal_way.x()) * 180 /
+                                                    std::numbers::pi)) +
+                      " has it: is it turned by half a turn?");
   return found;
+}
+
+std::string approach_of(const data::Trajectory& trajectory) {
+  constexpr double kDown = 1e-3;    // noise of a robot's poses, and the give of what it touches [m]
+  constexpr double kLifted = 2e-2;  // above its lowest place: what follows is another descent [m]
+  double lowest = trajectory.poses.front().translation().z();
+  for (const Eigen::Isometry3d& pose : trajectory.poses) {
+    if (pose.translation().z() > lowest + kLifted) break;
+    lowest = std::min(lowest, pose.translation().z());
+  }
+  std::size_t down = 0;
+  while (trajectory.poses[down].translation().z() > lowest + kDown) ++down;
+  if (down == 0) return "";
+  const double fall = trajectory.poses.front().translation().z() - trajectory.poses[down].translation().z();
+  return "the gripper comes down by " + metres(fall) + " first, until " +
+         data::format_clock(trajectory.times[down]) + " s: --from " +
+         data::format_clock(trajectory.times[down]) + " starts there";
+}
+
+void check_patch(const data::Recording& recording) {
+  const data::Selection& select = recording.grasps.front().select;
+  const double longer =
+      (recording.mesh.vertices.colwise().maxCoeff() - recording.mesh.vertices.colwise().minCoeff())
+          .maxCoeff();
+  if (!select.corner || select.within <= 0.5 * longer) return;
+  throw data::InputError("--grasp-within: found " + data::format_short(select.within) +
+                         " m, expected at most half of the sheet's longer side, " +
+                         data::format_short(0.5 * longer) + " m (25 mm are 0.025)");
+}
+
+std::string questioned_settings(const data::Recording& recording) {
+  const data::NuisanceBounds& bounds = recording.nuisance;
+  const data::Selection& select = recording.grasps.front().select;
+  std::vector<data::UsualNumber> numbers = {
+      {"--offset-bound", bounds.offset.maxCoeff(), 0, 0.1, "m", "", " (10 mm are 0.01)"},
+      {"--yaw-bound", bounds.yaw, 0, 0.35, "rad", "", " (2 deg are 0.035)"},
+      {"--start-yaw-bound", bounds.start_yaw, 0, 0.5, "rad", "", " (10 deg are 0.17)"},
+      {"--time-offset-bound", bounds.time, 0, 1, "s", "", " (50 ms are 0.05)"},
+      {"--table-height-bound", bounds.table_height, 0, 0.05, "m", "", " (5 mm are 0.005)"}};
+  if (select.vertices.empty())
+    numbers.push_back({"--grasp-within", select.within, 0.005, 0.1, "m", "", " (25 mm are 0.025)"});
+  return data::questioned("import", numbers);
 }
 
 }  // namespace flash::sysid

@@ -18,4 +18,17 @@ namespace flash::sysid {
 std::vector<std::string> contradictions(const data::Recording& recording,
                                         const std::vector<data::Keyframe>& keyframes);
 
+/// Where the tool comes down before it lifts, as of a recording that begins with the approach: when it is
+/// down, and the option that cuts there. Down is where it is within 1 mm of its lowest place before it
+/// rises by 20 mm. Empty where it begins there.
+std::string approach_of(const data::Trajectory& trajectory);
+
+/// Throws data::InputError that names --grasp-within where a patch at a corner is more than half of the
+/// sheet.
+void check_patch(const data::Recording& recording);
+
+/// One line about the size of the grasp and the bounds that are unusual, as units were mistaken (mm for m,
+/// degrees for radians), with the usual ranges; empty where there are none.
+std::string questioned_settings(const data::Recording& recording);
+
 }  // namespace flash::sysid

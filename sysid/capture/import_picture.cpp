@@ -69,6 +69,7 @@ struct Shown {
   std::vector<std::array<int, 2>> outline;    ///< of the sheet
   std::vector<Eigen::Vector3d> way;           ///< of the gripper
   std::vector<const data::Keyframe*> frames;  ///< some, in order of time
+  double start = 0;                           ///< of the first frame, seen or not [s]
   Eigen::AlignedBox3d box;
 };
 
@@ -83,6 +84,7 @@ Shown shown_of(const data::Recording& recording, const std::vector<data::Keyfram
     if (t <= keyframes.back().time + 1e-9) shown.way.push_back(data::pose_at(trajectory, t).translation());
   if (shown.way.empty()) shown.way.push_back(trajectory.poses.front().translation());
   for (const Eigen::Vector3d& place : shown.way) shown.box.extend(place);
+  shown.start = keyframes.front().time;
   std::vector<const data::Keyframe*> seen;
   for (const data::Keyframe& keyframe : keyframes)
     if (keyframe.cloud.rows() > 0) seen.push_back(&keyframe);
@@ -164,7 +166,7 @@ std::string legend(const Shown& shown, const std::vector<Eigen::Vector3d>& camer
     line(colour_of(shown.frames.size() < 2
                        ? 0
                        : static_cast<double>(f) / static_cast<double>(shown.frames.size() - 1)),
-         formatted("cloud at %.2f s", shown.frames[f]->time));
+         formatted("cloud %.2f s after the first", shown.frames[f]->time - shown.start));
   svg += formatted(
       "<line x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\" stroke=\"#111\" stroke-width=\"3\"/>\n", left,
       y + 6, left + 0.1 * scale, y + 6);

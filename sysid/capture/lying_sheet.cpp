@@ -7,16 +7,32 @@
 #include <numbers>
 
 namespace flash::sysid {
+namespace {
+
+/// The right edge along x, the left one along y.
+Eigen::Rotation2Dd to_edges(const LyingSheet& sheet) {
+  return Eigen::Rotation2Dd(std::atan2(sheet.left, sheet.right) - sheet.heading);
+}
+
+double outside_of(const Eigen::Vector2d& size, const Eigen::Vector2d& local) {
+  return (local - local.cwiseMax(0.0).cwiseMin(size)).norm();
+}
+
+}  // namespace
+
+double distance_beside(const LyingSheet& sheet, const Eigen::Vector2d& point) {
+  return outside_of({sheet.right, sheet.left}, to_edges(sheet) * (point - sheet.corner));
+}
 
 double distance_to(const LyingSheet& sheet, const std::vector<Eigen::Vector2d>& points) {
   if (points.empty()) return std::numeric_limits<double>::infinity();
-  const Eigen::Rotation2Dd turn(std::atan2(sheet.left, sheet.right) - sheet.heading);
+  const Eigen::Rotation2Dd turn = to_edges(sheet);
   const Eigen::Vector2d size(sheet.right, sheet.left);
-  std::vector<Eigen::Vector2d> local;  // right edge along x, left edge along y
+  std::vector<Eigen::Vector2d> local;
   double outside = 0;
   for (const Eigen::Vector2d& point : points) {
     local.push_back(turn * (point - sheet.corner));
-    outside += (local.back() - local.back().cwiseMax(0.0).cwiseMin(size)).norm();
+    outside += outside_of(size, local.back());
   }
   constexpr int samples = 16;  // a side
   double unseen = 0;

@@ -12,6 +12,9 @@ struct LyingSheet {
   double heading = 0;                                ///< of the diagonal, about z from x [rad]
 };
 
+/// Distance from the rectangle to a point [m]; 0 in it.
+double distance_beside(const LyingSheet& sheet, const Eigen::Vector2d& point);
+
 /// Mean distance from the rectangle to the points and from the points to the rectangle, both counted [m].
 /// Infinite without points.
 double distance_to(const LyingSheet& sheet, const std::vector<Eigen::Vector2d>& points);

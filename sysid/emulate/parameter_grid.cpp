@@ -101,7 +101,7 @@ Hold parse_hold(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
     throw data::InputError("--hold: \"" + text +
-                           "\": expected name=value or name=value:measured, as friction=0.3");
+                           "\": expected name=value, name=value+-SD or name=value:measured, as friction=0.3");
   const std::string name = text.substr(0, equals);
   const std::string where = "--hold " + name;
   const Parameter& info = info_of(where, name);
@@ -111,8 +111,10 @@ Hold parse_hold(const std::string& text) {
   const std::size_t sign = word.find(kDeviation);
   const std::optional<double> value = data::parse_number(word.substr(0, sign));
   if (!value || !std::isfinite(*value))
-    throw data::InputError(where + ": found \"" + std::string(word) +
-                           "\", expected a number, or one with :measured");
+    throw data::InputError(
+        where + ": found \"" + std::string(word) +
+        "\", expected a number, one with its standard deviation, as 0.31+-0.005, or one with "
+        ":measured");
   check_range(where, info, *value);
   Hold hold{{name, {*value}, false}, measured};
   if (sign == std::string_view::npos) return hold;

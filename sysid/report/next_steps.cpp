@@ -80,6 +80,25 @@ void add_experiments(const Summary& summary, std::vector<std::string>& steps) {
                     " by a tenth: hold it at a value that is known, or record something else.");
 }
 
+/// What warnings ask for, before an answer counts that they doubt.
+void add_warned(const Summary& summary, std::vector<std::string>& steps) {
+  const auto is_said = [&](const std::string& warning) {
+    for (const SummaryRecording& recording : summary.recordings)
+      if (warning.starts_with(recording.name + ": the model does not fit")) return true;
+    for (const ParameterFinding& finding : summary.parameters)
+      if (warning.starts_with(finding.name + ": the best value is")) return true;
+    return false;
+  };
+  for (const SummaryRecording& recording : summary.recordings)
+    if (!model_fits(recording))
+      steps.push_back(
+          "Find what the model of " + recording.name +
+          " misses: look at the estimate over what was seen, first at the grasp "
+          "(--grasp-shape, --grasp-size), then the start's yaw and the table, then the material.");
+  for (const std::string& warning : summary.warnings)
+    if (!is_said(warning)) steps.push_back("See to what the search warns of: " + warning + ".");
+}
+
 /// What is left to do where the search itself proposes nothing: to look at what was seen, and at why.
 void add_looks(const Summary& summary, std::vector<std::string>& steps) {
   const std::string why =
@@ -133,6 +152,7 @@ std::vector<std::string> next_steps(const Summary& summary) {
                         data::format_short((*finding.interval95)[1]) + ":9" +
                         (finding.logarithmic ? ":log." : "."));
   if (usable && summary.exit_code == 0) {
+    add_warned(summary, steps);
     std::string but;
     for (const std::string& caveat : caveats(summary)) but += (but.empty() ? " (" : "; ") + caveat;
     steps.push_back("Export the tuned asset with its intervals: flash-sysid export RUN -o tuned.json" + but +

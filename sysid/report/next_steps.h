@@ -7,8 +7,8 @@
 namespace flash::sysid {
 
 /// What a user should do next: the range to widen, the experiment that is expected to tell most, and those
-/// that tell best what it does not (Summary::next_experiments), or the export; where to look where there is
-/// nothing of these.
+/// that tell best what it does not (Summary::next_experiments), what warnings name, and last the export;
+/// where to look where there is nothing of these.
 std::vector<std::string> next_steps(const Summary& summary);
 
 /// What whoever uses the intervals has to know, a line each: that they reach to the values searched next to

@@ -97,6 +97,17 @@ std::string warning_of_misfit(const SummaryRecording& recording, const std::stri
          ". The intervals allow for it, but are those of a model that does not fit";
 }
 
+/// Frames that end long before the gripper does may have been stamped at too high a rate.
+std::string doubt_of_rate(const data::Recording& recording) {
+  if (recording.grasps.empty() || recording.keyframes.size() < 2) return "";
+  const data::Trajectory& trajectory = recording.trajectories.at(recording.grasps.front().gripper);
+  const double frames = recording.keyframes.back().time - recording.keyframes.front().time;
+  const double poses = trajectory.times.back() - trajectory.times.front();
+  if (frames >= 2.0 / 3 * poses) return "";
+  return "its frames take " + data::format_short(frames) + " s, its trajectory " + data::format_short(poses) +
+         " s: is the rate of the frames too high (--times)?";
+}
+
 /// ": numbers 3, 7 of results.csv"; of many, the first five.
 std::string numbers_of_unconverged(const std::vector<CandidateResult>& candidates) {
   constexpr int kNamed = 5;
@@ -138,6 +149,10 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
     if (replay.recording.camera)
       for (const std::string& warning : replay.recording.camera->warnings)
         warnings.push_back(replay.recording.name + ": calibration of its camera: " + warning);
+  for (std::size_t r = 0; r < summary.recordings.size() && r < replays.size(); ++r)
+    if (!model_fits(summary.recordings[r]))
+      if (const std::string rate = doubt_of_rate(replays[r].recording); !rate.empty())
+        warnings.push_back(summary.recordings[r].name + ": " + rate);
   for (std::size_t r = 0; r < fit.recordings.size(); ++r)
     for (const RegistrationParameter& parameter : registration_parameters) {
       if (!is_at_bound(fit.recordings[r].bounds_hit, parameter)) continue;

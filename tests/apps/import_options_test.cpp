@@ -110,9 +110,21 @@ TEST_F(ImportOptionsOfAFolder, TakeWhatTheCloudsWereSegmentedWith) {
     EXPECT_TRUE(read(each.second, true).taken[0].starts_with("warning: " + std::string(each.first)))
         << each.first;
   }
-  EXPECT_EQ(
-      read([](auto&, sysid::ImportSettings& settings) { settings.table_height = 0.06; }, false).table_height,
-      0.06);
+  const auto stated = [&](double height, double bound) {
+    return read(
+        [&](auto&, sysid::ImportSettings& settings) {
+          settings.table_height = height;
+          settings.nuisance.offset.setConstant(bound);
+        },
+        false);
+  };
+  EXPECT_TRUE(stated(0.054, 0).taken[0].starts_with("the trajectory") ||
+              stated(0.054, 0).taken[0].find("--table-z") == std::string::npos);
+  EXPECT_EQ(data::input_error_of([&] { stated(0.038, 0); }),
+            "--table-z: found 0.038 m, expected 0.05 m, as in " + (folder_ / "segment.json") +
+                ", with which the clouds were segmented; --despite-doubts takes it as it is");
+  EXPECT_NE(stated(0.038, 0.01).taken[0].find("--table-z: found 0.038 m, expected 0.05 m"),
+            std::string::npos);
   cell.times.pop_back();
   save_segmented_cell(cell, folder_ / "segment.json");
   EXPECT_NE(
@@ -152,10 +164,13 @@ TEST_F(ImportOptionsOfAFolder, AreRefusedByTheirNames) {
   const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
   EXPECT_EQ(message_of([&](ImportOptions& o) { o.trajectory = one; }),
             "--trajectory: " + one + ": found one pose, expected two or more");
+  EXPECT_EQ(message_of([&](ImportOptions& o) { o.clouds = folder_ / ".", o.trajectory = ""; }),
+            (folder_ / ".") + ": found no clouds, expected a folder of .ply or .pcd files: is it " +
+                (folder_ / "./clouds") + "?");
   EXPECT_EQ(message_of([](ImportOptions& o) { o.clouds = ""; }),
             "import: expected either a folder of clouds or --depth");
   EXPECT_EQ(message_of([](ImportOptions& o) { o.depth = o.clouds, o.clouds = ""; }),
-            options_.clouds + ": found no .png files for --depth");
+            options_.clouds + ": found no depth images, expected a folder of .png or .tiff files");
   folder_.write("depth/a.png", "");
   EXPECT_EQ(message_of([&](ImportOptions& o) { o.depth = folder_ / "depth", o.clouds = ""; }),
             "import: --depth needs --extrinsics, and --intrinsics where these hold no lens");

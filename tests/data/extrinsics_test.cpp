@@ -58,7 +58,7 @@ TEST_F(ExtrinsicsFile, AnAnswerThatCannotBeUsedIsRefusedUnlessAccepted) {
             (folder_ / "camera.json") +
                 ": exit_code: found 3, expected 0: flash-calib handeye ended with an answer that "
                 "cannot be used (rotations turn about one axis only); calibrate again, or take "
-                "it as it is with --force");
+                "it as it is with --despite-doubts");
   const CameraPose pose = load_camera_pose(folder_ / "camera.json", true);
   EXPECT_FALSE(pose.usable);
   EXPECT_EQ(pose.warnings, (std::vector<std::string>{"rotations turn about one axis only", "second"}));

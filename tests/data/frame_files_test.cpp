@@ -76,6 +76,13 @@ TEST(FrameFiles, JumpsOfATrajectoryAreFound) {
             "g.tum: 2 jumps of up to 10.01 m from one pose to the next, faster than 5 m/s; first after pose "
             "4: is the "
             "trajectory of one piece?");
+  trajectory = between(0, 1);
+  for (Eigen::Isometry3d& pose : trajectory.poses)
+    pose.translation() = 1000 * (pose.translation().array() + 0.5);
+  EXPECT_EQ(
+      find_jumps(trajectory, "g.tum").at(0),
+      "g.tum: 10 jumps of up to 10 m from one pose to the next, faster than 5 m/s; first after pose 1: are "
+      "the poses in millimetres? Expected metres");
 }
 
 }  // namespace

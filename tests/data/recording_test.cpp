@@ -267,7 +267,7 @@ TEST_F(RecordingFiles, GraspOffTheMeshIsAnError) {
   json_["object"]["start"]["T_base_object"] = {0.15, 0, 0, 0, 0, 0, 1};
   EXPECT_EQ(
       message(),
-      "grasps[0]: at t = 0 s gripper gripper is 0.1 m from the vertices it should hold, expected at "
+      "grasps[0]: at t = 0 s the gripper is 0.1 m from the vertices it should hold, expected at "
       "most "
       "within 0.05 m plus nuisance.offset_m 0 m: check object.start, select and the frame of the trajectory");
   json_["nuisance"]["offset_m"] = {0.3, 0, 0};

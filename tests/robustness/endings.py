@@ -139,19 +139,19 @@ def refusals(sim, sysid, calib):
                ["--depth-scale", f'found "{scale}"', "from 1e-09 to 10"])
               for verb in ("detect", "handeye", "plan") for scale in ("nan", "1e300", "0")],
             ([calib, "register", "left.json", "right.json", "--without-images"], ["right.json", "exit_code", "one axis"]),
-            ([calib, "validate", ".", "--extrinsics", "right.json"], ["right.json", "exit_code", "one axis", "--force"]),
+            ([calib, "validate", ".", "--extrinsics", "right.json"], ["right.json", "exit_code", "one axis", "--despite-doubts"]),
             ([calib, "handeye", ".", "--setups", "eye-in-hand"], ["--setups: unknown option", 'did you mean "--setup"']),
             ([calib, "register", "left.json", "--workspace", "0.5", "0", "0.3"], ["--workspace", 'found "0.5"', "x,y,z"]),
             ([calib, "detect", ".", "--target", ""], ["--target", "found \"\""])]),
-        ([sysid, "segment", "raw", "-o", "out"], ["extrinsics.json", "exit_code", "one axis", "--force"])]
+        ([sysid, "segment", "raw", "-o", "out"], ["extrinsics.json", "exit_code", "one axis", "--despite-doubts"])]
 
 
 def check_accepted(options, folder):
-    """--force takes a calibration that cannot be used; its warnings go on."""
+    """--despite-doubts takes a calibration that cannot be used; its warnings go on."""
     if options.calib is None:
         return
     done = program.call(options.calib, "register", folder / "left.json", folder / "right.json", "--without-images",
-                        "--force", "-o", folder / "cell.json")
+                        "--despite-doubts", "-o", folder / "cell.json")
     yield done.returncode == 3, f"exit code {done.returncode}, expected 3: the cell stands on what cannot be used"
     cell = json.loads((folder / "cell.json").read_text())
     for warning in ("left.json: two views were left out", "right.json: rotations turn about one axis only"):

@@ -327,16 +327,18 @@ def check_places(options, folder):
 
 
 def check_calibration(options, folder):
-    """--force takes a camera that cannot be used; what stands on it says so, to the report."""
+    """--despite-doubts takes a camera that cannot be used; what stands on it says so, to the report."""
     words = [options.sysid, "import", "--depth", "view/depth", "--intrinsics", "view/camera_info.yaml", "--trajectory",
              "gripper.tum", "--times", "rate:2", "--mesh", "sheet:0.2x0.2:0.05:alternating", "--table-z", "0"]
     yield from refused(options, folder, [*words, "--extrinsics", "unusable.json", "-o", "lift"], "unusable.json",
-                       "exit_code", "one axis only", "--force")
+                       "exit_code", "one axis only", "--despite-doubts")
+    yield from refused(options, folder, [*words, "--extrinsics", "unusable.json", "--force", "-o", "lift"],
+                       "exit_code", "--despite-doubts")
     expected = ["flash-calib handeye ended with exit code 3, an answer that cannot be used", "one axis only", "second"]
     for extrinsics, texts in (("unusable.json", expected), ("view/extrinsics.json", ["two views were left out"])):
-        done = program.call(*words, "--extrinsics", extrinsics, "--force", "-o", "lift", cwd=folder)
-        yield done.returncode == 0, f"import --force: exit code {done.returncode}: {done.stderr}"
-        yield all(f"{extrinsics}: {text}" in done.stderr for text in texts), f"import --force: {done.stderr}"
+        done = program.call(*words, "--extrinsics", extrinsics, "--despite-doubts", "--force", "-o", "lift", cwd=folder)
+        yield done.returncode == 0, f"import --despite-doubts: exit code {done.returncode}: {done.stderr}"
+        yield all(f"{extrinsics}: {text}" in done.stderr for text in texts), f"import --despite-doubts: {done.stderr}"
         camera = json.loads((folder / "lift" / "recording.json").read_text())["camera"]
         yield camera.get("warnings") == texts, f"recording.json keeps {camera.get('warnings')}"
         for verb, more in (("replay", []), ("grid", ["--bending", "1e-5,1e-4", "--no-solver-check", "--no-horizon"]),

@@ -139,7 +139,7 @@ void check_cell(const std::vector<RawView>& views, const std::vector<double>& ti
   if (!settings.accept_fault)
     throw data::InputError(text + ". Look at the camera's pose and at the frame and the tool of " +
                            (settings.gripper ? settings.gripper_path : "the trajectory") +
-                           "; --force takes them as they are");
+                           "; --despite-doubts takes them as they are");
   result.warnings.push_back(text);
 }
 
@@ -286,7 +286,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
     const int next = static_cast<int>(shown.size());
     if (next < columns && k == (columns == 1 ? 0 : next * (frames - 1) / (columns - 1))) {
       frame.labels = segmentation.labels;
-      if (!times.empty()) frame.time = times[k];
+      if (!times.empty()) frame.time = times[k] - times.front();
       shown.push_back(std::move(frame));
     }
     segmentation.labels.clear();

@@ -11,7 +11,7 @@ namespace flash::sysid {
 struct LabelledFrame {
   data::Points points;             ///< base frame [m]
   std::vector<PointLabel> labels;  ///< one a point
-  std::optional<double> time{};    ///< [s]; empty: not known
+  std::optional<double> time{};    ///< since the first frame [s]; empty: not known
 };
 
 /// An SVG picture: a column a frame with its time, from the side (x to the right, z up) above, from the top

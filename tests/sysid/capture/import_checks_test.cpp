@@ -4,6 +4,7 @@
 
 #include "data/procedural_mesh.h"
 #include "sysid/capture/import_picture.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {
 namespace {
@@ -97,9 +98,46 @@ TEST(ImportChecks, AHalfTurnOfTheSheetIsNamed) {
 
 TEST(ImportChecks, ThePictureShowsWhatASearchStartsFrom) {
   const std::string svg = draw_import(lift_of(0.8), clouds_of(diagonal, 0.8), {{0.5, -1, 0.9}});
-  for (const char* words : {"sheet as it starts", "way of the gripper", "table", "camera 0.50 -1.00 0.90 m",
-                            "cloud at 0.25 s", "cloud at 1.00 s", "100 mm", "</svg>"})
+  for (const char* words :
+       {"sheet as it starts", "way of the gripper", "table", "camera 0.50 -1.00 0.90 m",
+        "cloud 0.00 s after the first", "cloud 0.75 s after the first", "100 mm", "</svg>"})
     EXPECT_NE(svg.find(words), std::string::npos) << words;
+}
+
+TEST(ImportChecks, AnApproachIsNamedWithItsEnd) {
+  data::Recording recording = lift_of(0.8);
+  data::Trajectory& trajectory = recording.trajectories["gripper"];
+  EXPECT_EQ(approach_of(trajectory), "");
+  trajectory.times = {10, 10.5, 11, 12, 13};
+  trajectory.poses.clear();
+  for (const double z : {0.17, 0.1, 0.1, 0.5, 0.05})
+    trajectory.poses.emplace_back(Eigen::Translation3d(0, 0, z));
+  EXPECT_EQ(approach_of(trajectory),
+            "the gripper comes down by 0.07 m first, until 10.5 s: --from 10.5 starts there");
+}
+
+TEST(ImportChecks, APatchOfMoreThanHalfOfTheSheetIsRefused) {
+  data::Recording recording = lift_of(0.8);
+  recording.grasps[0].select.within = 0.15;
+  EXPECT_EQ(data::input_error_of([&] { check_patch(recording); }), "");
+  recording.grasps[0].select.within = 25;
+  EXPECT_EQ(data::input_error_of([&] { check_patch(recording); }),
+            "--grasp-within: found 25 m, expected at most half of the sheet's longer side, 0.15 m (25 mm are "
+            "0.025)");
+}
+
+TEST(ImportChecks, BoundsOfOtherUnitsAreQuestionedInOneLine) {
+  data::Recording recording = lift_of(0.8);
+  recording.grasps[0].select.within = 0.025;
+  recording.nuisance.offset.setConstant(0.06);  // a camera placed by hand
+  recording.nuisance.yaw = 0.26;
+  EXPECT_EQ(questioned_settings(recording), "");
+  recording.nuisance.offset.setConstant(10);
+  recording.nuisance.yaw = 2;
+  EXPECT_EQ(
+      questioned_settings(recording),
+      "import: unusual, is the unit right? --offset-bound found 10 m, usually 0 to 0.1 (10 mm are 0.01); "
+      "--yaw-bound found 2 rad, usually 0 to 0.35 (2 deg are 0.035)");
 }
 
 }  // namespace

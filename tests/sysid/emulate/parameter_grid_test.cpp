@@ -97,7 +97,8 @@ TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
   EXPECT_EQ(message_of([] { parse_hold("friction=1e300"); }),
             "--hold friction: found 1e+300, expected 0 to 1000");
   EXPECT_EQ(message_of([] { parse_hold("friction=low"); }),
-            "--hold friction: found \"low\", expected a number, or one with :measured");
+            "--hold friction: found \"low\", expected a number, one with its standard deviation, as "
+            "0.31+-0.005, or one with :measured");
 }
 
 TEST(ParameterGrid, AHeldValueIsAssumedUnlessItWasMeasured) {

@@ -93,12 +93,28 @@ TEST(NextSteps, AnExportIsNeverProposedWithoutItsCaveats) {
   EXPECT_TRUE(mentions(next_steps(summary),
                        "export RUN -o tuned.json (intervals are those of a model that does not fit lift)"));
   EXPECT_TRUE(mentions(standing_unknowns(summary), "the model does not fit lift"));
+  EXPECT_TRUE(mentions(next_steps(summary), "Find what the model of lift misses"));
   summary.by_points = true;
   EXPECT_EQ(caveats(summary).size(), 2u);
   EXPECT_TRUE(mentions(next_steps(summary), "changes too abruptly between them; intervals are"));
   EXPECT_TRUE(
       mentions(next_steps(summary), "Search more values of bending rigidity: --bending 8e-05:0.00015:9:log"));
   EXPECT_TRUE(mentions(standing_unknowns(summary), "too abruptly"));
+}
+
+TEST(NextSteps, WhatWarningsNameStandsBeforeTheExport) {
+  Summary summary = example_summary();
+  summary.recordings[0].misfit.found = true;
+  summary.warnings = {
+      "lift: the model does not fit: apart from noise of 1.2 mm it misses the cloth by 1.64 mm",
+      "young was not measured, and the recordings tell it: search it as well",
+      "cells of 20.2 mm are coarse. Search on cells of 14 mm"};
+  const std::vector<std::string> steps = next_steps(summary);
+  EXPECT_TRUE(mentions(steps, "young was not measured, and the recordings tell it: search it as well."));
+  EXPECT_TRUE(mentions(steps, "Search on cells of 14 mm."));
+  EXPECT_FALSE(mentions(steps, "misses the cloth by 1.64 mm"));  // the step about the misfit says what to do
+  EXPECT_TRUE(steps.back().starts_with("Export"));
+  EXPECT_FALSE(steps.front().starts_with("Export"));
 }
 
 TEST(NextSteps, AnAssumedWeightIsNotKnown) {
