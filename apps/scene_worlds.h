@@ -10,9 +10,11 @@ namespace flash::sim {
 
 /// The worlds of each object of a scene: `environments` of each, of which 0 is the object itself and the
 /// others differ by `variations`. Throws data::InputError, naming the file, for an object that the scene's
-/// method cannot step, what a variation does not find in any object, and where there is too little memory.
+/// method or a device cannot step, what a variation does not find in any object, and where there is too
+/// little memory.
 std::vector<Worlds> scene_worlds(const data::Scene& scene, const std::vector<SceneBody>& bodies,
-                                 int environments, const std::vector<Variation>& variations, int threads);
+                                 int environments, const std::vector<Variation>& variations, int threads,
+                                 const DeviceChoice& device = {});
 
 /// Takes one step of all of them, on up to `threads` threads.
 void step(std::vector<Worlds>& worlds, int threads);
