@@ -49,6 +49,13 @@ bool ends_here(const RunningScene& at, SceneSummary& summary) {
   return false;
 }
 
+/// Of an object of one body of triangles, as it stands [J].
+double gravitational_energy(const SceneBody& body) {
+  const Environment& environment = body.environment;
+  const Eigen::VectorXd heights = environment.state.positions * environment.gravity;
+  return -environment.materials[0].areal_density * body.sheet.vertex_area.dot(heights);
+}
+
 bool motions_are_over(const std::vector<Worlds>& worlds) {
   return std::all_of(worlds.begin(), worlds.end(), [](const Worlds& of_object) {
     for (int e = 0; e < of_object.size(); ++e)
@@ -74,6 +81,8 @@ bool take_step(RunningScene& at, int number, SceneSummary& summary) {
   for (std::size_t b = 0; b < at.bodies.size(); ++b) {
     at.bodies[b].environment.state = at.worlds[b].environment(0).state;
     reports.push_back(at.worlds[b].report(0));
+    if (at.run.device.device == Device::cuda)
+      reports.back().gravitational = gravitational_energy(at.bodies[b]);
   }
   const double time =
       at.bodies.empty() ? number * at.scene.time_step : at.bodies.front().environment.state.time;
@@ -132,6 +141,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   if (scene.steps_by_default && run.steps < 0)
     summary.notices.push_back(scene.source + ": names no length: " + std::to_string(scene.steps) +
                               " steps are run, the default");
+  if (run.device.device == Device::cuda)
+    summary.notices.push_back(scene.source +
+                              ": a CUDA device does not tell what is held inside obstacles or starts there");
   if (run.notice)
     for (const std::string& notice : summary.notices) run.notice(notice);
 
@@ -143,7 +155,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       (run.environments > 1 ? " in " + data::format_count(std::size_t(run.environments)) + " environments"
                             : "");
   begins("setting up " + size);
-  std::vector<Worlds> worlds = scene_worlds(scene, bodies, run.environments, run.variations, run.threads);
+  std::vector<Worlds> worlds =
+      scene_worlds(scene, bodies, run.environments, run.variations, run.threads, run.device);
   SceneWriter writer(scene, bodies, steps, run.contacts, output_dir);
   SceneObserver observer(bodies.size());
   RunningScene running{

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "data/scene.h"
+#include "sim/device.h"
 #include "sim/scene/variation.h"
 
 namespace flash::sim {
@@ -46,6 +47,7 @@ struct SceneRun {
   int environments = 1;                 ///< of the scene, side by side
   std::vector<Variation> variations{};  ///< by which those after the first differ
   bool contacts = false;                ///< whether to write contacts and resultants at each frame
+  DeviceChoice device{};                ///< where all of it is stepped: the CPU or one CUDA device
   std::function<void(const std::string&)> notice = {};  ///< told each notice before the first step
   std::function<void(const std::string&)> phase = {};   ///< told what begins that may take minutes
   /// Before the first step and after each; false stops the run.

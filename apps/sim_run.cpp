@@ -150,6 +150,13 @@ int run(const RunOptions& options) {
   if (!settings.variations.empty() && settings.environments < 2)
     throw data::InputError(
         "--vary: found one environment, expected --envs of 2 or more: the first is the scene itself");
+  settings.device = sim::choose_device(options.device == "auto" ? "cpu" : options.device);
+  if (settings.device.cuda_devices.size() > 1)
+    throw data::InputError("--device " + options.device +
+                           ": found several devices, expected one: a run is "
+                           "not shared out");
+  if (settings.device.device == sim::Device::cuda && options.contacts)
+    throw data::InputError("--contacts: forces of each contact are told on the CPU alone; use --device cpu");
   begin("reading " + options.scene);
   const data::Scene scene = data::load_scene(options.scene);
   ProgressLine progress(!options.quiet);
@@ -238,11 +245,12 @@ void add_run_verb(CLI::App& app, Action& action) {
       "A scene that names neither steps nor duration runs 100 steps.\n"
       "Examples:\n"
       "  flash-sim run scene.json -o out\n"
-      "  flash-sim run scene.json -o out --envs 64 --vary bending=0.5:2:log,friction=0.2:0.8");
+      "  flash-sim run scene.json -o out --envs 64 --vary bending=0.5:2:log,friction=0.2:0.8\n"
+      "  flash-sim run scene.json -o out --envs 256 --device cuda");
   verb.add_option("scene", options->scene, "Scene file (.json)")->required();
   verb.add_option("-o,--out", options->out, "Folder to write")->required();
-  verb.add_option("--device", options->device, "Where the simulation runs")
-      ->check(cpu_alone("scenes run on the CPU alone"))
+  verb.add_option("--device", options->device,
+                  "Where the simulation runs: cpu, cuda or cuda:1, by number; auto: the CPU")
       ->capture_default_str();
   verb.add_option("--envs", options->environments,
                   "Environments of the scene, side by side; frames and tables are those of the first")

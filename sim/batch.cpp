@@ -1,6 +1,7 @@
 #include "sim/batch.h"
 
 #include <algorithm>
+#include <limits>
 #include <mutex>
 #include <numeric>
 #include <optional>
@@ -11,9 +12,10 @@
 #include "data/parallel.h"
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/projective_phases.h"
-#include "sim/device_batch.h"
 #include "sim/device_error.h"
+#include "sim/device_shares.h"
 #include "sim/environment_checks.h"
+#include "sim/projective_batch.h"
 #include "sim/step/resultants.h"
 #include "sim/worlds.h"
 #include "sim/zeroed_numbers.h"
@@ -33,12 +35,23 @@ void copy_wrenches(const std::vector<Wrench>& wrenches, double* to) {
 
 }  // namespace
 
+/// The worlds of environments of a batch on one device.
+struct DeviceShare {
+  std::vector<int> members;  ///< their numbers in the batch
+  std::optional<Worlds> worlds;
+};
+
 struct Batch::Storage {
   std::shared_ptr<const SheetPlan> plan;
   BatchSettings settings;
-  std::optional<Worlds> worlds;               ///< on the processor
-  std::vector<Environment> environments;      ///< on a device
-  std::vector<double> positions, velocities;  ///< likewise
+  std::optional<Worlds> worlds;  ///< on the processor
+  // On devices:
+  std::vector<Environment> environments;
+  std::vector<double> positions, velocities;
+  std::vector<DeviceShare> shares;
+  std::vector<Lost> lost;
+  std::vector<std::string> why_lost;
+
   int step = 0;
   std::ptrdiff_t count = 0, vertices = 0, holds = 0, bodies = 0, obstacles = 0;
   std::vector<double> hold_forces;
@@ -46,7 +59,7 @@ struct Batch::Storage {
   std::vector<StepStats> stats;
   std::vector<std::vector<ContactForce>> contacts;
   std::vector<double> body_resultants, obstacle_resultants;
-  std::vector<double> phase_ticks;  ///< of a device
+  std::vector<double> phase_ticks;  ///< of devices
   std::mutex of_ticks;
 
   std::ptrdiff_t steps() const { return settings.steps - settings.first_step; }
@@ -60,11 +73,10 @@ struct Batch::Storage {
   }
 
   /// Keeps the positions of environment e where they are wanted.
-  void keep(int e, int at) {
+  void keep(int e, int at, const Points& x) {
     const auto& wanted = settings.kept_steps;
     const auto found = std::lower_bound(wanted.begin(), wanted.end(), at);
     if (found == wanted.end() || *found != at) return;
-    const Points& x = state(e).positions;
     std::copy(x.data(), x.data() + x.size(), kept_at(e, found - wanted.begin()));
   }
 
@@ -76,37 +88,28 @@ struct Batch::Storage {
               velocities.data() + e * 3 * vertices);
   }
 
-  /// Takes the next steps of all environments on the device.
-  void advance_on_device(int before, int steps_further, const std::function<void(int)>& finished) {
-    DeviceResults results;
-    results.stepped = [&](const DeviceSteps& taken) {
-      const std::ptrdiff_t place = taken.environment * steps() + taken.first - settings.first_step;
-      std::copy(taken.stats.begin(), taken.stats.end(), stats.begin() + place);
-      std::copy(taken.hold_forces.begin(), taken.hold_forces.end(), hold_forces.begin() + 3 * place * holds);
-    };
-    results.kept_at = [&](int e, int index) { return kept_at(e, index); };
-    results.timed = [&](std::span<const double> ticks) {
-      const std::scoped_lock lock(of_ticks);
-      phase_ticks.resize(ticks.size());
-      for (std::size_t k = 0; k < ticks.size(); ++k) phase_ticks[k] += ticks[k];
-    };
-    results.finished = [&](int e) {
-      show(e);
-      if (finished) finished(e);
-    };
-    sim::advance_on_device(plan, environments, settings, before, steps_further, results);
+  void add_ticks(std::span<const double> ticks) {
+    const std::scoped_lock lock(of_ticks);
+    phase_ticks.resize(ticks.size());
+    for (std::size_t k = 0; k < ticks.size(); ++k) phase_ticks[k] += ticks[k];
   }
 
-  /// Keeps what the step from `before` was like.
-  void take(int e, int before) {
-    const StepReport& report = worlds->report(e);
+  /// Keeps what the step from `before` of environment e was like, number `own` of the worlds.
+  void take(const Worlds& from, int own, int e, int before) {
+    const StepReport& report = from.report(own);
     const std::ptrdiff_t place = e * steps() + before - settings.first_step;
     stats[place] = {report.residual,       report.penetration_max, report.iterations, report.solves,
                     report.factorizations, report.substeps,        report.converged};
     for (std::ptrdiff_t k = 0; k < holds; ++k)
       std::copy(report.hold_forces[k].data(), report.hold_forces[k].data() + 3,
                 hold_forces.data() + (place * holds + k) * 3);
-    keep(e, before + 1);
+    keep(e, before + 1, from.environment(own).state.positions);
+  }
+
+  /// Keeps that environment e, which is lost, does not take the step from `before`.
+  void skip(int e, int before) {
+    stats[e * steps() + before - settings.first_step].residual = std::numeric_limits<double>::infinity();
+    keep(e, before + 1, state(e).positions);
   }
 
   /// Keeps the contacts of the last step of environment e, and their sums.
@@ -124,12 +127,130 @@ struct Batch::Storage {
     const int end = before + steps_further;
     std::vector<int> at(static_cast<std::size_t>(count), before);  // the step at which each stands
     worlds->step(
-        steps_further, [&](int e) { take(e, at[static_cast<std::size_t>(e)]++); },
+        steps_further, [&](int e) { take(*worlds, e, e, at[static_cast<std::size_t>(e)]++); },
         [&](int e) {
           if (settings.contacts && steps_further > 0) keep_contacts(e);
           if (end == settings.steps) worlds->drop_solver(e);
           if (finished) finished(e);
         });
+  }
+
+  std::vector<int> devices() const {
+    return settings.cuda_devices.empty() ? std::vector<int>{0} : settings.cuda_devices;
+  }
+
+  /// The kept steps from `before` on up to `end`.
+  std::span<const int> kept_between(int before, int end) const {
+    const std::vector<int>& all = settings.kept_steps;
+    return {std::upper_bound(all.begin(), all.end(), before), std::upper_bound(all.begin(), all.end(), end)};
+  }
+
+  /// The worlds of environments that are not lost, as they stand, with memory for steps up to `end`.
+  DeviceShare make_share(const std::vector<int>& part, int cuda_device, int before, int end) const {
+    DeviceShare share;
+    std::vector<Environment> own;
+    for (const int e : part) {
+      if (lost[static_cast<std::size_t>(e)] != Lost::no) continue;
+      share.members.push_back(e);
+      own.push_back(environments[static_cast<std::size_t>(e)]);
+    }
+    if (own.empty()) return share;
+    share.worlds.emplace(
+        plan, std::move(own),
+        WorldSettings{.solver = settings.solver,
+                      .first_step = before,
+                      .threads = settings.threads,
+                      .device = Device::cuda,
+                      .cuda_device = cuda_device,
+                      .steps_at_once = end - before,
+                      .positions_at_once = static_cast<int>(kept_between(before, end).size())});
+    return share;
+  }
+
+  /// Takes the next steps of the worlds of a device. Adds to the failures those that did not come to the end.
+  void advance_share(DeviceShare& share, int before, int end, DeviceFailures& failures,
+                     const std::function<void(int)>& finished) {
+    std::vector<int> at(share.members.size(), before);
+    std::vector<char> done(share.members.size(), 0);
+    const auto member = [&](int own) { return share.members[static_cast<std::size_t>(own)]; };
+    try {
+      share.worlds->step(
+          end - before,
+          [&](int own) { take(*share.worlds, own, member(own), at[static_cast<std::size_t>(own)]++); },
+          [&](int own) {
+            const int e = member(own);
+            const auto place = static_cast<std::size_t>(e);
+            environments[place].state = share.worlds->environment(own).state;
+            lost[place] = share.worlds->lost(own);
+            why_lost[place] = share.worlds->why_lost(own);
+            show(e);
+            done[static_cast<std::size_t>(own)] = 1;
+            if (finished) finished(e);
+          },
+          kept_between(before, end));
+      add_ticks(share.worlds->phase_ticks());
+    } catch (const DeviceError& error) {
+      std::vector<int> others;
+      for (std::size_t own = 0; own < done.size(); ++own)
+        if (done[own] == 0) others.push_back(share.members[own]);
+      if (others.size() == done.size()) throw;
+      failures.add(error.why(), others);
+    }
+  }
+
+  /// Takes the next steps of all environments on devices. Where a device has room for its whole share, that
+  /// stays there.
+  void advance_on_devices(int before, int steps_further, const std::function<void(int)>& finished) {
+    const int end = before + steps_further;
+    const std::vector<int> numbers = devices();
+    shares.resize(numbers.size());
+    std::vector<int> all(static_cast<std::size_t>(count));
+    std::iota(all.begin(), all.end(), 0);
+    DeviceFailures failures;
+    share_out(numbers.size(), all, failures, [&](std::size_t device, const std::vector<int>& part) {
+      DeviceShare& share = shares[device];
+      if (!share.worlds || share.members != part) {
+        share = {};  // so that both need not fit
+        share = make_share(part, numbers[device], before, end);
+        for (const int e : part) {
+          if (lost[static_cast<std::size_t>(e)] == Lost::no) continue;
+          for (int k = before; k < end; ++k) skip(e, k);
+          if (finished) finished(e);
+        }
+      }
+      if (share.worlds) advance_share(share, before, end, failures, finished);
+    });
+    if (end == settings.steps) shares.clear();
+    failures.throw_any();
+  }
+
+  /// The same by the projective method.
+  void advance_projective(int before, int steps_further, const std::function<void(int)>& finished) {
+    DeviceResults results;
+    results.stepped = [&](const DeviceSteps& taken) {
+      const std::ptrdiff_t place = taken.environment * steps() + taken.first - settings.first_step;
+      std::copy(taken.stats.begin(), taken.stats.end(), stats.begin() + place);
+      std::copy(taken.hold_forces.begin(), taken.hold_forces.end(), hold_forces.begin() + 3 * place * holds);
+    };
+    results.kept_at = [&](int e, int index) { return kept_at(e, index); };
+    results.timed = [&](std::span<const double> ticks) { add_ticks(ticks); };
+    results.finished = [&](int e) {
+      show(e);
+      if (finished) finished(e);
+    };
+    sim::advance_projective(plan, environments, settings, before, steps_further, results);
+  }
+
+  void advance_on_device(int before, int steps_further, const std::function<void(int)>& finished) {
+    if (settings.solver.stop != nullptr && *settings.solver.stop) throw data::Stopped();
+    if (settings.contacts)
+      throw data::InputError(
+          "--device cuda: forces of each contact and resultants of bodies (contacts) are told on the CPU "
+          "alone");
+    if (settings.projective)
+      advance_projective(before, steps_further, finished);
+    else
+      advance_on_devices(before, steps_further, finished);
   }
 };
 
@@ -192,9 +313,11 @@ Batch::Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> env
     s.environments = std::move(environments);
     s.positions.resize(3 * s.count * s.vertices);
     s.velocities.resize(3 * s.count * s.vertices);
+    s.lost.resize(s.count, Lost::no);
+    s.why_lost.resize(s.count);
     for (int e = 0; e < size(); ++e) s.show(e);
   }
-  for (int e = 0; e < size(); ++e) s.keep(e, s.step);
+  for (int e = 0; e < size(); ++e) s.keep(e, s.step, s.state(e).positions);
 }
 
 Batch::~Batch() = default;
@@ -209,21 +332,21 @@ void Batch::advance(int steps, const std::function<void(int)>& finished) {
   if (steps < 0 || steps > s.settings.steps - s.step)
     throw std::invalid_argument("batch: it cannot advance beyond its last step");
   const int first = std::exchange(s.step, -1);
-  if (s.worlds) {
+  if (s.worlds)
     s.advance_on_processor(first, steps, finished);
-  } else {
-    if (s.settings.solver.stop != nullptr && *s.settings.solver.stop) throw data::Stopped();
+  else
     s.advance_on_device(first, steps, finished);
-  }
   s.step = first + steps;
 }
 
 Lost Batch::lost(int environment) const {
-  return storage_->worlds ? storage_->worlds->lost(environment) : Lost::no;
+  const Storage& s = *storage_;
+  return s.worlds ? s.worlds->lost(environment) : s.lost[static_cast<std::size_t>(environment)];
 }
 
 std::string Batch::why_lost(int environment) const {
-  return storage_->worlds ? storage_->worlds->why_lost(environment) : std::string();
+  const Storage& s = *storage_;
+  return s.worlds ? s.worlds->why_lost(environment) : s.why_lost[static_cast<std::size_t>(environment)];
 }
 
 const State& Batch::state(int environment) const { return storage_->state(environment); }

@@ -54,9 +54,10 @@ struct BatchSettings {
   std::vector<int> cuda_devices{};  ///< by number, which share the environments; empty: the first
 };
 
-/// Many environments over one plan, each with its own material, for a whole replay: on the processor a loop
-/// over Worlds. Environment e of a batch equals the same environment alone, bitwise, on any number of threads
-/// and however often it advances. On a device that holds where it advances by multiples of restart_interval.
+/// Many environments over one plan, each with its own material, for a whole replay: a loop over Worlds.
+/// Environment e of a batch equals the same environment alone, bitwise, on any number of threads and devices
+/// and however often it advances. Where a device has no room for all at once that holds where it advances by
+/// multiples of restart_interval, as for the projective method there.
 class Batch {
  public:
   /// Throws as Worlds does, and std::invalid_argument where the steps do not ascend from first_step to
@@ -71,12 +72,14 @@ class Batch {
   /// Takes the next `steps` steps of each environment. The thread that took them calls `finished` with the
   /// number of the environment, so that its results can be used while others go on. Unconverged steps are
   /// in the statistics, never thrown. An environment that is lost finishes too: it stays where it was, and
-  /// the steps it did not take are unconverged, with an infinite residual. Throws what a worker threw, a
-  /// DeviceError as advance_on_device does, data::Stopped where settings.solver.stop ended it; a batch that
-  /// has thrown cannot advance any more.
+  /// the steps it did not take are unconverged, with an infinite residual. Throws what a worker threw,
+  /// data::InputError for what a device cannot do, data::Stopped where settings.solver.stop ended it. Where a
+  /// device is lost or one environment alone does not fit into its memory it goes on with what it can and
+  /// throws a DeviceError at the end, which names the environments without a result; all others have
+  /// finished. A batch that has thrown cannot advance any more.
   void advance(int steps, const std::function<void(int)>& finished = {});
 
-  /// Whether and why an environment is lost, as Worlds says. On a device none is.
+  /// Whether and why an environment is lost, as Worlds says. By the projective method none is on a device.
   Lost lost(int environment) const;
   std::string why_lost(int environment) const;
 

@@ -28,4 +28,9 @@ class DeviceError : public std::runtime_error {
   std::vector<std::size_t> without_result_;
 };
 
+/// The memory of a CUDA device does not suffice for all environments at once.
+struct OutOfDeviceMemory : DeviceError {
+  using DeviceError::DeviceError;
+};
+
 }  // namespace flash::sim

@@ -214,7 +214,7 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads)
   s.quasistatic = scene.rest_motion.has_value();
   s.notices = scene.notices;
   const std::vector<SceneBody> bodies = scene_bodies(scene, scene.steps, s.notices);
-  s.worlds = scene_worlds(scene, bodies, environments, {}, threads, &s.stop);
+  s.worlds = scene_worlds(scene, bodies, environments, {}, threads, {}, &s.stop);
   for (std::size_t w = 0; w < bodies.size(); ++w) {
     s.starts.push_back(bodies[w].environment.state);
     const Sheet& sheet = bodies[w].sheet;

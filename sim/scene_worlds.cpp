@@ -94,14 +94,16 @@ std::size_t vertices_of(const std::vector<SceneBody>& bodies) {
 
 std::vector<Worlds> scene_worlds(const data::Scene& scene, const std::vector<SceneBody>& bodies,
                                  int environments, const std::vector<Variation>& variations, int threads,
-                                 const std::atomic<bool>* stop) {
-  check_memory(scene, bodies, environments);
+                                 const DeviceChoice& device, const std::atomic<bool>* stop) {
+  if (device.device == Device::cpu) check_memory(scene, bodies, environments);
   std::vector<Worlds> worlds;
   try {
     check_variations(bodies, variations);
     WorldSettings settings = settings_of(scene.solver, scene.time_step);
     settings.threads = environments > 1 ? threads : 1;
     settings.solver.stop = stop;
+    settings.device = device.device;
+    if (!device.cuda_devices.empty()) settings.cuda_device = device.cuda_devices.front();
     for (const SceneBody& body : bodies) {
       check_method(scene.solver, body);
       worlds.push_back(worlds_of(body, environments, variations, settings));

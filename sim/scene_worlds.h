@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "data/scene.h"
+#include "sim/device.h"
 #include "sim/scene/scene.h"
 #include "sim/scene/variation.h"
 #include "sim/worlds.h"
@@ -12,11 +13,11 @@ namespace flash::sim {
 
 /// The worlds of each object of a scene: `environments` of each, of which 0 is the object itself and the
 /// others differ by `variations`. Throws data::InputError, naming the file, for an object that the scene's
-/// method cannot step, what a variation does not find in any object, and where there is too little memory.
-/// `stop`: as SolverSettings has it.
+/// method or a device cannot step, what a variation does not find in any object, and where there is too
+/// little memory. `stop`: as SolverSettings has it.
 std::vector<Worlds> scene_worlds(const data::Scene& scene, const std::vector<SceneBody>& bodies,
                                  int environments, const std::vector<Variation>& variations, int threads,
-                                 const std::atomic<bool>* stop = nullptr);
+                                 const DeviceChoice& device = {}, const std::atomic<bool>* stop = nullptr);
 
 /// Takes `count` steps of all of them, on up to `threads` threads.
 void step(std::vector<Worlds>& worlds, int threads, int count = 1);

@@ -142,29 +142,49 @@ void reset(World& world, const WorldSettings& settings) {
   clear_report(world, 0);
 }
 
-void take_step(const std::shared_ptr<const SheetPlan>& plan, const WorldSettings& settings, World& world) {
-  if (world.lost != Lost::no) return clear_report(world, never);
-  const double start = world.environment.state.time;
-  try {
-    if (world.driven) world.driven->begin_step(start);
-    open_what_misses(world);
-    world.report = step_by_method(plan, settings, world);
-  } catch (const MissedGrasp& error) {
-    clear_report(world, never);
-    return lose(world, Lost::no_vertex_in_reach, error.what());
-  } catch (const data::InputError& error) {
-    clear_report(world, never);
-    return lose(world, Lost::refused, error.what());
-  }
+void skip_step(World& world) { clear_report(world, never); }
+
+void begin_step(World& world) {
+  if (world.driven) world.driven->begin_step(world.environment.state.time);
+  open_what_misses(world);
+}
+
+void end_step(World& world, const WorldSettings& settings, StepReport report, double start, bool finite) {
+  world.report = std::move(report);
   ++world.steps;
   const auto at = [&] { return " in the step from " + data::format_short(start) + " s"; };
-  if (!std::isfinite(world.report.residual) || !world.environment.state.positions.allFinite())
+  if (!std::isfinite(world.report.residual) || !finite)
     lose(world, Lost::not_finite, "positions are not finite any more" + at());
   else if (world.report.residual > settings.lost_residual)
     lose(world, Lost::not_solved,
          "forces stay out of balance" + at() + ": found a residual of " +
              data::format_short(world.report.residual) + ", expected at most " +
              data::format_short(settings.lost_residual));
+}
+
+bool goes_on(World& world, const std::function<void()>& attempt) {
+  try {
+    attempt();
+    return true;
+  } catch (const MissedGrasp& error) {
+    lose(world, Lost::no_vertex_in_reach, error.what());
+  } catch (const data::InputError& error) {
+    lose(world, Lost::refused, error.what());
+  }
+  skip_step(world);
+  return false;
+}
+
+void take_step(const std::shared_ptr<const SheetPlan>& plan, const WorldSettings& settings, World& world) {
+  if (world.lost != Lost::no) return skip_step(world);
+  const double start = world.environment.state.time;
+  StepReport report;
+  const bool taken = goes_on(world, [&] {
+    begin_step(world);
+    report = step_by_method(plan, settings, world);
+  });
+  if (taken)
+    end_step(world, settings, std::move(report), start, world.environment.state.positions.allFinite());
 }
 
 std::vector<ContactForce> contacts_of(const World& world) {

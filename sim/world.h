@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -25,6 +26,10 @@ struct WorldSettings {
   long first_step = 0;  ///< steps that the environments have taken at their start
   int threads = 1;      ///< 0: one a processor
   Device device = Device::cpu;
+  // Of a CUDA device:
+  int cuda_device = 0;        ///< by number
+  int steps_at_once = 1;      ///< so many of one call have memory from the start; more take more
+  int positions_at_once = 0;  ///< likewise of steps whose positions are seen
 };
 
 /// Why an environment is not stepped any more.
@@ -80,6 +85,19 @@ void release(World& world, int hold);
 
 /// Back to its start, but for its materials.
 void reset(World& world, const WorldSettings& settings);
+
+/// The parts of take_step. A step that a lost world does not take has an infinite residual.
+void skip_step(World& world);
+
+/// Lets the frames of a world go on to the next step, and opens the holds that may miss and do.
+void begin_step(World& world);
+
+/// Notes the report of a step from `start` [s], which may lose the world. `finite`: whether its positions
+/// are.
+void end_step(World& world, const WorldSettings& settings, StepReport report, double start, bool finite);
+
+/// attempt(), where what it says of the environment loses the world. Returns whether it goes on.
+bool goes_on(World& world, const std::function<void()>& attempt);
 
 /// Takes one step, or none where the world is lost. What goes wrong in it loses the world.
 void take_step(const std::shared_ptr<const SheetPlan>& plan, const WorldSettings& settings, World& world);

@@ -10,6 +10,8 @@
 #include "data/parallel.h"
 #include "data/text.h"
 #include "data/trajectory.h"
+#include "sim/device_limits.h"
+#include "sim/device_worlds.h"
 #include "sim/environment_checks.h"
 #include "sim/step/body_law.h"
 #include "sim/tensor_entries.h"
@@ -47,8 +49,6 @@ void check_end_effector(const EndEffector& effector) {
          "found a friction that is none, expected 0 or more");
 }
 
-Tensor dense(const double* numbers, Shape shape) { return {.data = numbers, .shape = std::move(shape)}; }
-
 void copy_rows(const Points& rows, double* to) { std::copy(rows.data(), rows.data() + rows.size(), to); }
 
 }  // namespace
@@ -59,8 +59,10 @@ struct Worlds::Storage {
   std::vector<World> worlds;
   std::vector<int> every;  ///< 0, 1, ...
   std::int64_t vertices = 0, holds = 0, obstacles = 0;
-  std::vector<double> positions, velocities, hold_forces, obstacle_forces;
+  std::vector<double> positions, velocities;  ///< on the processor
+  std::vector<double> hold_forces, obstacle_forces;
   std::vector<WorldStatus> status;
+  std::unique_ptr<DeviceWorlds> device;  ///< null: the processor steps them
 
   int size() const { return static_cast<int>(worlds.size()); }
   World& at(int e) { return worlds[static_cast<std::size_t>(e)]; }
@@ -105,6 +107,22 @@ struct Worlds::Storage {
       all.push_back(data::from_vector(pose));
     }
     return all;
+  }
+
+  /// Dense numbers where the environments are.
+  Tensor view(const double* numbers, Shape shape) const {
+    return {.data = numbers,
+            .shape = std::move(shape),
+            .device = settings.device,
+            .device_number = device ? settings.cuda_device : 0};
+  }
+  Tensor view_of(std::span<const double> numbers, Shape shape) const {
+    return view(device ? device->copy_of(numbers) : numbers.data(), std::move(shape));
+  }
+
+  void expect_processor(const char* setter) const {
+    if (device)
+      refuse(setter, "found environments on a CUDA device, expected those of the CPU, which alone does that");
   }
 
   void expect_hold(const char* setter, int hold) const {
@@ -163,19 +181,25 @@ struct Worlds::Storage {
       try {
         check_material(materials[i]);
         body_laws(*plan, tried);
+        if (device) check_on_device({tried}, settings);
       } catch (const InputError& error) {
         refuse(setter, environment_name(which[i]) + ": " + error.what());
       }
     }
-    for (std::size_t i = 0; i < which.size(); ++i) place(at(which[i]).environment) = materials[i];
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      place(at(which[i]).environment) = materials[i];
+      if (device) device->write_material(which[i]);
+    }
   }
 
   /// Copies what the views show of an environment to where all are side by side.
   void show(int e) {
     const World& world = at(e);
     const State& state = world.environment.state;
-    copy_rows(state.positions, positions.data() + e * 3 * vertices);
-    copy_rows(state.velocities, velocities.data() + e * 3 * vertices);
+    if (!device) {
+      copy_rows(state.positions, positions.data() + e * 3 * vertices);
+      copy_rows(state.velocities, velocities.data() + e * 3 * vertices);
+    }
     const StepReport& report = world.report;
     double* to = hold_forces.data() + e * 3 * holds;
     for (const Eigen::Vector3d& force : report.hold_forces) to = std::copy(force.begin(), force.end(), to);
@@ -196,7 +220,9 @@ struct Checkpoint::Saved {
   std::shared_ptr<const SheetPlan> plan;
   bool projective;
   double time_step;
+  Device device;
   std::vector<World> worlds;
+  std::vector<std::vector<char>> on_device;  ///< what a device has of each
 };
 
 int Checkpoint::size() const { return saved_ ? static_cast<int>(saved_->worlds.size()) : 0; }
@@ -204,11 +230,8 @@ int Checkpoint::size() const { return saved_ ? static_cast<int>(saved_->worlds.s
 Worlds::Worlds(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments,
                WorldSettings settings)
     : storage_(std::make_unique<Storage>()) {
-  if (settings.device != Device::cpu)
-    throw InputError(
-        "worlds: device: found cuda, expected cpu: environments that stay alive are stepped on the CPU alone "
-        "so far; a batch has a device");
   check_environments(*plan, environments);
+  if (settings.device == Device::cuda) check_on_device(environments, settings);
   Storage& s = *storage_;
   s.plan = std::move(plan);
   s.settings = std::move(settings);
@@ -221,8 +244,12 @@ Worlds::Worlds(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> e
   }
   s.every.resize(environments.size());
   std::iota(s.every.begin(), s.every.end(), 0);
-  s.positions.resize(3 * count * s.vertices);
-  s.velocities.resize(3 * count * s.vertices);
+  if (s.settings.device == Device::cuda)
+    s.device = device_worlds(s.plan, s.worlds, s.settings);
+  else {
+    s.positions.resize(3 * count * s.vertices);
+    s.velocities.resize(3 * count * s.vertices);
+  }
   s.hold_forces.resize(3 * count * s.holds);
   s.obstacle_forces.resize(3 * count * s.obstacles);
   s.status.resize(environments.size());
@@ -231,11 +258,13 @@ Worlds::Worlds(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> e
 
 Worlds::~Worlds() = default;
 Worlds::Worlds(Worlds&&) noexcept = default;
+Worlds& Worlds::operator=(Worlds&&) noexcept = default;
 
 int Worlds::size() const { return storage_->size(); }
 
 EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses) {
   Storage& s = *storage_;
+  s.expect_processor("add");
   check_end_effector(effector);
   const std::vector<Eigen::Isometry3d> at = s.poses_of("add", s.every, poses);
   const auto frames_of = [](const World& world) { return world.plan ? std::ssize(world.plan->frames) : 0; };
@@ -286,6 +315,7 @@ void Worlds::set_poses(const Chosen& environments, int frame, const Tensor& pose
 
 void Worlds::set_gravity(const Chosen& environments, const Tensor& gravity) {
   Storage& s = *storage_;
+  s.expect_processor("set_gravity");
   const std::span<const int> chosen = s.numbers_of("set_gravity", environments);
   const double* numbers = s.entries_of("set_gravity", "gravity", chosen, gravity, {3});
   for (std::size_t i = 0; i < chosen.size(); ++i)
@@ -296,6 +326,7 @@ void Worlds::set_friction(const Chosen& environments, int obstacle, std::span<co
                           int body) {
   Storage& s = *storage_;
   const char* setter = "set_friction";
+  s.expect_processor(setter);
   const std::span<const int> chosen = s.numbers_of(setter, environments);
   if (friction.size() != chosen.size())
     refuse(setter, "found " + std::to_string(friction.size()) + " coefficients, expected " +
@@ -355,10 +386,13 @@ void Worlds::set_velocities(const Chosen& environments, const Tensor& velocities
   const std::span<const int> chosen = s.numbers_of("set_velocities", environments);
   const double* numbers = s.entries_of("set_velocities", "velocities", chosen, velocities, {s.vertices, 3});
   for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (s.device) s.device->read_state(chosen[i]);
     s.at(chosen[i]).environment.state.velocities =
         Eigen::Map<const Points>(numbers + static_cast<std::int64_t>(i) * 3 * s.vertices, s.vertices, 3);
+    if (s.device) s.device->write_velocities(chosen[i]);
     s.show(chosen[i]);
   }
+  if (s.device) s.device->renew();
 }
 
 void Worlds::reset(const Chosen& environments, const Tensor& positions, const Tensor& velocities) {
@@ -381,16 +415,27 @@ void Worlds::reset(const Chosen& environments, const Tensor& positions, const Te
                .velocities = Points::Zero(s.vertices, 3),
                .held = {}};
     if (v != nullptr) state.velocities = rows_of(v, i);
+    if (s.device) s.device->write_state(chosen[i]);
     s.show(chosen[i]);
   }
+  if (s.device) s.device->renew();
 }
 
-void Worlds::step(int count, const std::function<void(int)>& seen, const std::function<void(int)>& finished) {
+void Worlds::step(int count, const std::function<void(int)>& seen, const std::function<void(int)>& finished,
+                  std::span<const int> positions_at) {
   Storage& s = *storage_;
   const std::atomic<bool>* stop = s.settings.solver.stop;
   const auto throw_if_stopped = [&] {
     if (stop != nullptr && *stop) throw data::Stopped();
   };
+  if (s.device) {
+    throw_if_stopped();
+    s.device->step(count, positions_at, seen, [&](int e) {
+      s.show(e);
+      if (finished) finished(e);
+    });
+    return s.device->renew();
+  }
   data::for_each_in_parallel(s.worlds.size(), s.settings.threads, [&](std::size_t index) {
     const int e = static_cast<int>(index);
     throw_if_stopped();
@@ -406,20 +451,23 @@ void Worlds::step(int count, const std::function<void(int)>& seen, const std::fu
 }
 
 Tensor Worlds::positions() const {
-  return dense(storage_->positions.data(), {size(), storage_->vertices, 3});
+  const Storage& s = *storage_;
+  return s.view(s.device ? s.device->positions() : s.positions.data(), {size(), s.vertices, 3});
 }
 Tensor Worlds::velocities() const {
-  return dense(storage_->velocities.data(), {size(), storage_->vertices, 3});
+  const Storage& s = *storage_;
+  return s.view(s.device ? s.device->velocities() : s.velocities.data(), {size(), s.vertices, 3});
 }
 Tensor Worlds::hold_forces() const {
-  return dense(storage_->hold_forces.data(), {size(), storage_->holds, 3});
+  return storage_->view_of(storage_->hold_forces, {size(), storage_->holds, 3});
 }
 Tensor Worlds::obstacle_forces() const {
-  return dense(storage_->obstacle_forces.data(), {size(), storage_->obstacles, 3});
+  return storage_->view_of(storage_->obstacle_forces, {size(), storage_->obstacles, 3});
 }
 Tensor Worlds::status() const {
-  return dense(storage_->status.empty() ? nullptr : &storage_->status.front().steps,
-               {size(), status_columns});
+  const std::vector<WorldStatus>& status = storage_->status;
+  const double* first = status.empty() ? nullptr : &status.front().steps;
+  return storage_->view_of(std::span(first, status.size() * status_columns), {size(), status_columns});
 }
 
 const WorldStatus& Worlds::status(int environment) const {
@@ -428,6 +476,7 @@ const WorldStatus& Worlds::status(int environment) const {
 Lost Worlds::lost(int environment) const { return storage_->at(environment).lost; }
 const std::string& Worlds::why_lost(int environment) const { return storage_->at(environment).why_lost; }
 const Environment& Worlds::environment(int environment) const {
+  if (storage_->device) storage_->device->read_state(environment);
   return storage_->at(environment).environment;
 }
 const StepReport& Worlds::report(int environment) const { return storage_->at(environment).report; }
@@ -439,13 +488,21 @@ void Worlds::drop_solver(int environment) {
   World& world = storage_->at(environment);
   world.newton.reset();
   world.projective.reset();
+  if (storage_->device) storage_->device->forget_solver(environment);
+}
+
+std::vector<double> Worlds::phase_ticks() const {
+  return storage_->device ? storage_->device->phase_ticks() : std::vector<double>();
 }
 
 Checkpoint Worlds::save(const Chosen& environments) const {
   const Storage& s = *storage_;
-  Checkpoint::Saved saved{s.plan, s.settings.projective.has_value(), s.time_step(), {}};
-  for (const int e : s.numbers_of("save", environments))
+  Checkpoint::Saved saved{s.plan, s.settings.projective.has_value(), s.time_step(), s.settings.device, {},
+                          {}};
+  for (const int e : s.numbers_of("save", environments)) {
+    if (s.device) saved.on_device.push_back(s.device->save(e));
     saved.worlds.push_back(copy_of(s.worlds[static_cast<std::size_t>(e)]));
+  }
   Checkpoint checkpoint;
   checkpoint.saved_ = std::make_shared<const Checkpoint::Saved>(std::move(saved));
   return checkpoint;
@@ -462,6 +519,8 @@ void Worlds::load(const Chosen& environments, const Checkpoint& checkpoint) {
   if (saved.plan != s.plan) refuse("load", "found environments of another plan, expected this one's");
   if (saved.projective != s.settings.projective.has_value() || saved.time_step != s.time_step())
     refuse("load", "found environments of another method or time step, expected these");
+  if (saved.device != s.settings.device)
+    refuse("load", "found environments of another kind of device, expected this one's");
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const Environment& environment = saved.worlds[i].environment;
     if (std::ssize(environment.holds) != s.holds || std::ssize(environment.obstacles) > s.obstacles)
@@ -472,10 +531,12 @@ void Worlds::load(const Chosen& environments, const Checkpoint& checkpoint) {
   }
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     s.at(chosen[i]) = copy_of(saved.worlds[i]);
+    if (s.device) s.device->load(chosen[i], saved.on_device[i]);
     double* unused = s.obstacle_forces.data() + chosen[i] * 3 * s.obstacles;
     std::fill(unused, unused + 3 * s.obstacles, 0.0);
     s.show(chosen[i]);
   }
+  if (s.device) s.device->renew();
 }
 
 }  // namespace flash::sim

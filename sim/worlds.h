@@ -49,7 +49,8 @@ class Checkpoint {
 };
 
 /// Many environments over one plan that stay alive, each with its own materials, motion and state. What is
-/// given from outside, at any step, holds from the next step on. There is no last step.
+/// given from outside, at any step, holds from the next step on. There is no last step. On a CUDA device they
+/// stay there: a step brings the poses of its frames there, and what `seen` and the status need back.
 ///
 /// Environment e equals the same environment alone, bitwise, on any number of threads, in whatever parts the
 /// steps are taken, and after save and load. One that was reset equals a new one.
@@ -65,17 +66,19 @@ class Checkpoint {
 class Worlds {
  public:
   /// Frames that are to be given poses need a place to start from: a schedule of at least one pose each.
-  /// Throws as check_environments does, and data::InputError for another device than the processor.
+  /// Throws as check_environments does; on a CUDA device data::InputError for what it cannot do, and a
+  /// DeviceError, OutOfDeviceMemory where its memory does not suffice.
   Worlds(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments,
          WorldSettings settings);
   ~Worlds();
   Worlds(Worlds&&) noexcept;
+  Worlds& operator=(Worlds&&) noexcept;
 
   int size() const;
 
   /// Gives every environment an end effector, open, at its pose: environments x 7. The tensors of forces are
   /// others from then on. Throws data::InputError where a step has been taken, where the environments differ
-  /// in the number of their frames or obstacles, and for what is no size, threshold or friction.
+  /// in the number of their frames or obstacles, for what is no size, threshold or friction, and on a device.
   EndEffectorNumbers add(const EndEffector& effector, const Tensor& poses);
 
   /// Where a frame of the schedule is at the end of the next step: environments x 7. It stays there until it
@@ -89,10 +92,11 @@ class Worlds {
   void set_materials(const Chosen& environments, std::span<const data::SolidMaterial> materials,
                      int body = 0);
 
-  /// environments x 3 [m/s^2]. Throws data::InputError.
+  /// environments x 3 [m/s^2]. Throws data::InputError, on a device too.
   void set_gravity(const Chosen& environments, const Tensor& gravity);
 
-  /// Coulomb coefficients of an obstacle on one body, one for each environment. Throws data::InputError.
+  /// Coulomb coefficients of an obstacle on one body, one for each environment. Throws data::InputError, on a
+  /// device too.
   void set_friction(const Chosen& environments, int obstacle, std::span<const double> friction, int body = 0);
 
   /// A hold closes in the next step, on what is where the environment stands then. One that is closed goes on
@@ -111,14 +115,18 @@ class Worlds {
   /// none is given. Throws data::InputError.
   void reset(const Chosen& environments, const Tensor& positions = {}, const Tensor& velocities = {});
 
-  /// Takes the next steps of each environment. On the thread that took them `seen` is called after each step
-  /// of each, and `finished` once its views show the last one. Throws data::Stopped once settings.solver.stop
-  /// is set, and what these throw; then no step is to be used.
+  /// Takes the next steps of each environment. On one thread for each, `seen` is called for each of its
+  /// steps in turn, and `finished` once status and report are those of the last one. On a device the
+  /// positions of environment(e) are those of the step in `seen` after the steps of `positions_at` alone,
+  /// which ascend; they are numbered as WorldStatus::steps. Throws data::Stopped once settings.solver.stop is
+  /// set, a DeviceError, and what these throw; then no step is to be used.
   void step(int count = 1, const std::function<void(int environment)>& seen = {},
-            const std::function<void(int environment)>& finished = {});
+            const std::function<void(int environment)>& finished = {},
+            std::span<const int> positions_at = {});
 
-  // Views that stay where they are as long as the worlds do, those of forces until an end effector is added.
-  // What is in them is as it was at the end of the last `step`.
+  // Views of numbers where the environments are. They stay where they are as long as the worlds do, those of
+  // forces until an end effector is added. What is in them is as it was at the end of the last `step`. Those
+  // of a device take their memory when they are first asked for.
   Tensor positions() const;        ///< environments x vertices x 3 [m]
   Tensor velocities() const;       ///< environments x vertices x 3 [m/s]
   Tensor hold_forces() const;      ///< hold on sheet: environments x holds x 3 [N]
@@ -130,19 +138,27 @@ class Worlds {
   /// Why an environment is lost, in a line; empty where it is not.
   const std::string& why_lost(int environment) const;
 
-  // On the processor, up to the last step that the environment has taken.
+  /// Up to the last step that it has taken. Brings its state from a device first; threads may ask for
+  /// different ones at the same time.
   const Environment& environment(int environment) const;
+  /// A device says nothing of the work, of gravitational energy, and of what is held or starts inside
+  /// obstacles: these are zero.
   const StepReport& report(int environment) const;
-  std::vector<ContactForce> contacts(int environment) const;
+  std::vector<ContactForce> contacts(int environment) const;  ///< on the processor alone; else empty
 
-  /// Gives back the memory of an environment's solver. Its next step starts as that of a new one.
+  /// Gives back the memory of an environment's solver; on a device it stays. The next step starts as that of
+  /// a new one.
   void drop_solver(int environment);
+
+  /// Ticks that a device's processors spent in each phase of a step since they were last asked for; empty on
+  /// the processor.
+  std::vector<double> phase_ticks() const;
 
   /// Throws data::InputError where an environment is not there.
   Checkpoint save(const Chosen& environments) const;
 
   /// The i-th environment that was saved goes to the i-th of these. Throws data::InputError unless both are
-  /// of one plan, one method and one time step, with as many holds and no more obstacles.
+  /// of one plan, one method, one kind of device and one time step, with as many holds and no more obstacles.
   void load(const Chosen& environments, const Checkpoint& checkpoint);
 
  private:

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <atomic>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -72,7 +73,10 @@ struct ReplaySettings {
   int first_step = 0;             ///< at which the environments stand
   int steps = 0;                  ///< the last one
   std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; step 0 is the start
-  int restart_interval = device_restart_interval;  ///< a solver may change its team there
+  /// Steps after which a solver forgets what it has besides the state; 0: never.
+  int restart_interval = sim::restart_interval;
+  /// A step that ends with a larger residual, or with one that is no number, is the last of its environment.
+  double lost_residual = std::numeric_limits<double>::infinity();
   int team_blocks = 0;  ///< processors that work on an environment, 1, 2, 4 or 8; 0: team_stages has it
   FrontSettings fronts{};
 
@@ -94,16 +98,16 @@ struct ReplayStep {
 struct ReplayMemory;
 
 /// Replays of many environments of one sheet on the device, each step to the tolerance that the CPU's Solver
-/// has. A team, one processor or several, takes an environment through up to `restart_interval` steps and
-/// then another one that waits. So none waits for the others, and what an environment gets depends on its own
+/// has. A team, one processor or several, takes an environment through up to `turn_steps` steps and then
+/// another one that waits. So none waits for the others, and what an environment gets depends on its own
 /// numbers alone, bitwise. Linear problems are in single precision, energies, residuals, contact and
 /// positions in double. Held vertices and places of springs move on a straight line within a step that has to
 /// be halved.
 class BatchReplay {
  public:
-  /// Throws std::invalid_argument where environments do not fit the plan, have not the same bending operator,
-  /// miss holds or springs for a step, have springs with the projective method, or have more than
-  /// most_obstacles; std::runtime_error with the device's message.
+  /// Throws std::invalid_argument where environments do not fit the plan, miss holds or springs for a step,
+  /// have more than most_obstacles, or, with the projective method, have springs or not the same bending
+  /// operator; std::runtime_error with the device's message.
   BatchReplay(std::shared_ptr<const SheetPlan> plan, const std::vector<ReplayEnvironment>& environments,
               ReplaySettings settings);
   ~BatchReplay();
@@ -130,9 +134,11 @@ class BatchReplay {
   /// Ticks that the teams' first processors spent in each ReplayPhase.
   std::vector<double> phase_ticks() const;
 
+  const ReplayMemory& memory() const;
+
  private:
-  friend class ReplayReader;
-  std::unique_ptr<ReplayMemory> memory_;
+  struct Replay;
+  std::unique_ptr<Replay> replay_;
 };
 
 }  // namespace flash::sim::cuda

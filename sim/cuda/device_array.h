@@ -42,6 +42,13 @@ class DeviceArray {
     return *this;
   }
 
+  /// Room for so many numbers at least. What was in it is lost where it has to grow.
+  void hold(size_t size) {
+    if (size <= size_) return;
+    *this = DeviceArray();  // so that both need not fit
+    *this = DeviceArray(size);
+  }
+
   Number* data() const { return data_; }
   size_t size() const { return size_; }
 

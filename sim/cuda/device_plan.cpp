@@ -45,6 +45,43 @@ std::vector<StepColumns> by_steps_together(const std::vector<int>& columns) {
 
 }  // namespace
 
+DeviceBending::DeviceBending(const SheetLayout& layout)
+    : bundle_count_(static_cast<int>(layout.bundle_starts.size()) - 1),
+      hinge_count_(layout.hinge_count),
+      group_rows_(layout.group_rows),
+      bundle_starts_(layout.bundle_starts),
+      step_columns_(by_steps_together(layout.step_columns)),
+      step_values_(by_halves(layout.step_values)),
+      hinge_weights_(layout.hinge_weights),
+      hinge_rest_angles_(layout.hinge_rest_angles),
+      hinge_rest_areas_(layout.hinge_rest_areas),
+      single_step_values_(std::vector<float>(layout.step_values.begin(), layout.step_values.end())),
+      stand_in_(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end())),
+      hinge_vertices_(layout.hinge_vertices),
+      hinge_corner_starts_(layout.hinge_corner_starts),
+      hinge_corners_(layout.hinge_corners),
+      hinge_source_starts_(layout.hinge_source_starts),
+      hinge_sources_(layout.hinge_sources) {}
+
+void DeviceBending::put(SheetTables& sheet) const {
+  sheet.bundle_count = bundle_count_;
+  sheet.group_rows = group_rows_.data();
+  sheet.bundle_starts = bundle_starts_.data();
+  sheet.step_columns = step_columns_.data();
+  sheet.step_values = step_values_.data();
+  sheet.single_step_values = single_step_values_.data();
+  sheet.stand_in = stand_in_.data();
+  sheet.hinge_count = hinge_count_;
+  sheet.hinge_vertices = hinge_vertices_.data();
+  sheet.hinge_weights = hinge_weights_.data();
+  sheet.hinge_rest_angles = hinge_rest_angles_.data();
+  sheet.hinge_rest_areas = hinge_rest_areas_.data();
+  sheet.hinge_corner_starts = hinge_corner_starts_.data();
+  sheet.hinge_corners = hinge_corners_.data();
+  sheet.hinge_source_starts = hinge_source_starts_.data();
+  sheet.hinge_sources = hinge_sources_.data();
+}
+
 template <typename Number>
 const Number* DevicePlan::upload(const std::vector<Number>& numbers,
                                  std::vector<DeviceArray<Number>>& arrays) {
@@ -52,7 +89,7 @@ const Number* DevicePlan::upload(const std::vector<Number>& numbers,
   return arrays.back().data();
 }
 
-DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
+DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) : bending_(layout) {
   if (layout.size > most_vertices)
     throw std::invalid_argument("more than " + std::to_string(most_vertices) + " vertices");
   fronts.size = plan.size;
@@ -70,7 +107,6 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.size = layout.size;
   sheet.triangle_count = layout.triangle_count;
   sheet.block_count = layout.block_count;
-  sheet.bundle_count = static_cast<int>(layout.bundle_starts.size()) - 1;
   sheet.triangle_vertices = upload(layout.triangle_vertices, ints_);
   sheet.gradients = upload(layout.gradients, doubles_);
   sheet.areas = upload(layout.areas, doubles_);
@@ -82,27 +118,12 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.block_columns = upload(layout.block_columns, ints_);
   sheet.slice_starts = upload(layout.slice_starts, ints_);
   sheet.slice_columns = upload(layout.slice_columns, ints_);
-  sheet.group_rows = upload(layout.group_rows, ints_);
-  sheet.bundle_starts = upload(layout.bundle_starts, ints_);
-  sheet.step_columns = upload(by_steps_together(layout.step_columns), columns_);
-  sheet.step_values = upload(by_halves(layout.step_values), doubles_);
-  sheet.single_step_values =
-      upload(std::vector<float>(layout.step_values.begin(), layout.step_values.end()), floats_);
-  sheet.stand_in = upload(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end()), floats_);
   sheet.vertex_area = upload(layout.vertex_area, doubles_);
   sheet.least_area = least_vertex_share *
                      std::accumulate(layout.vertex_area.begin(), layout.vertex_area.end(), 0.0) / layout.size;
   sheet.edge_count = static_cast<int>(layout.edge_lengths.size());
   sheet.edge_lengths = upload(layout.edge_lengths, doubles_);
-  sheet.hinge_count = layout.hinge_count;
-  sheet.hinge_vertices = upload(layout.hinge_vertices, ints_);
-  sheet.hinge_weights = upload(layout.hinge_weights, doubles_);
-  sheet.hinge_rest_angles = upload(layout.hinge_rest_angles, doubles_);
-  sheet.hinge_rest_areas = upload(layout.hinge_rest_areas, doubles_);
-  sheet.hinge_corner_starts = upload(layout.hinge_corner_starts, ints_);
-  sheet.hinge_corners = upload(layout.hinge_corners, ints_);
-  sheet.hinge_source_starts = upload(layout.hinge_source_starts, ints_);
-  sheet.hinge_sources = upload(layout.hinge_sources, ints_);
+  bending_.put(sheet);
 }
 
 FrontTables DevicePlan::shared_out(const FrontPlan& plan, int team_blocks) {

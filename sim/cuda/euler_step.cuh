@@ -14,7 +14,8 @@ struct StepMotion {
   const SpringPlace* springs;
   int spring_count;
   const double* stiffness;  ///< of springs, by entry [N/m]
-  double* hold_forces;      ///< on the sheet, three numbers a hold, for which this step has zeros [N]
+  // On the sheet, three numbers a hold and an obstacle, for which this step has zeros [N].
+  double *hold_forces, *obstacle_forces;
   const PlacedObstacle* obstacles;
   int obstacle_count;
   bool several;            ///< whether a box stands beside another obstacle
@@ -116,11 +117,33 @@ __device__ inline void add_hold_forces(const Work& w, const StepProblem& step, c
   }
 }
 
+/// Adds what the obstacles exert in a share of the step.
+__device__ __noinline__ void add_obstacle_forces(const Work& w, const StepProblem& step,
+                                                 const StepMotion& motion, double share) {
+  const ContactSet& contacts = w.now.contacts;
+  for (int k = 0; k < motion.obstacle_count; ++k) {
+    double sums[3];
+    sum_over_team(w.replay.sheet.size, sums, shared_memory<double>(), [&](int i, double(&own)[3]) {
+      if (step.held_axes[i] != 0 || contacts.listed[i] == 0) return;
+      const TouchRecord touch = read(contacts.touches, i, k);
+      if ((touch.flags & 1) == 0) return;
+      const Triple force =
+          touch.normal_force * (touch.normal - w.obstacles[k].friction * touch.slip_direction);
+      for (int axis = 0; axis < 3; ++axis) own[axis] += force[axis];
+    });
+    if (team_rank() == 0)
+      for (int axis = 0; axis < 3; ++axis) motion.obstacle_forces[3 * k + axis] += share * sums[axis];
+    synchronize_team();
+  }
+}
+
 struct StepEnd {
-  bool sound;          ///< whether its energy came from somewhere, and contact is complementary
-  bool finite;         ///< whether all positions are
-  double penetration;  ///< deepest vertex below a surface [m]
-  double start_depth;  ///< deepest that started inside an obstacle [m]
+  bool sound;              ///< whether its energy came from somewhere, and contact is complementary
+  bool finite;             ///< whether all positions are
+  double penetration;      ///< deepest vertex below a surface [m]
+  double start_depth;      ///< deepest that started inside an obstacle [m]
+  double complementarity;  ///< of contact [m]
+  double kinetic;          ///< energy [J]
 };
 
 /// What springs do over a step.
@@ -192,10 +215,17 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
   const double allowed = energy_tolerance * there + sums[unbalanced] + contact.bristles + rounding;
   const bool finite = isfinite(sums[kinetic]);
   const bool complementary = contact.complementarity <= gap_tolerance;
-  if (!(gain <= allowed) || !complementary) return {false, finite, contact.penetration, contact.start_depth};
+  StepEnd end = {false,
+                 finite,
+                 contact.penetration,
+                 contact.start_depth,
+                 contact.complementarity,
+                 per_step * sums[kinetic]};
+  if (!(gain <= allowed) || !complementary) return end;
   const bool falls_below_start =
       w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + springs.at_start + allowed;
-  return {!start_is_feasible || falls_below_start, finite, contact.penetration, contact.start_depth};
+  end.sound = !start_is_feasible || falls_below_start;
+  return end;
 }
 
 /// What damping measures from, at the start of a step of h.
@@ -305,7 +335,12 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   if (!(residual <= stats.residual)) stats.residual = residual;
   ++stats.substeps;
   add_hold_forces(w, step, motion, end - begin);
+  add_obstacle_forces(w, step, motion, end - begin);
   stats.penetration = worse_of(stats.penetration, judged.penetration);
+  stats.complementarity = worse_of(stats.complementarity, judged.complementarity);
+  stats.kinetic = judged.kinetic;
+  stats.membrane = w.now.elastic.membrane;
+  stats.bending = w.now.elastic.bending;
   stats.converged = judged.sound && balanced(step, w.now, w.replay.tolerance);
   for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
     const Triple moved = triple(w.now.positions[i]) - triple(state.positions[i]),

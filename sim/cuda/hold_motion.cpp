@@ -75,6 +75,16 @@ int steps_before_a_hold_changes(const Environment& environment, double time_step
   return most;
 }
 
+bool closes_next(const Environment& environment, double time_step) {
+  const double time = environment.state.time;
+  const std::vector<HeldVertices>& held = environment.state.held;
+  for (std::size_t k = 0; k < environment.holds.size(); ++k)
+    if (is_closed(environment.holds[k], time, time + time_step) &&
+        (k >= held.size() || held[k].vertices.empty()))
+      return true;
+  return false;
+}
+
 HoldMotion motion_of_holds(Environment& environment, double time_step, int steps) {
   HoldMotion motion;
   const double start = environment.state.time;

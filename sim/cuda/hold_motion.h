@@ -11,6 +11,9 @@ int steps_before_a_hold_closes(const Environment& environment, double time_step,
 /// How many of the next `most` steps have the same holds closed.
 int steps_before_a_hold_changes(const Environment& environment, double time_step, int most);
 
+/// Whether a hold closes in the next step of `time_step` [s]: it takes vertices from where they are.
+bool closes_next(const Environment& environment, double time_step);
+
 /// What the holds carry in the next steps, which steps_before_a_hold_closes allows. environment.state.held
 /// becomes that at their end, as update_holds has it; the rest of the state stays.
 HoldMotion motion_of_holds(Environment& environment, double time_step, int steps);

@@ -87,8 +87,8 @@ __device__ void advance(CommonState<keeping>& common, int e, int first, int end)
   });
   PhaseClock{memory.clocks}.start();
   for (int at = first; at < end; ++at) {
-    const long place = at - replay.stats_begin;
-    const long row = static_cast<long>(material.motion) * replay.motion_steps + place;
+    const long place = at - replay.waiting.begins[e];
+    const long row = static_cast<long>(replay.motions[e]) * replay.motion_steps + place;
     const int* starts = replay.hold_starts + row;
     const ProjectiveMotion motion = {
         replay.holds + starts[0],
@@ -100,7 +100,7 @@ __device__ void advance(CommonState<keeping>& common, int e, int first, int end)
         replay.poses + row * replay.frames};
     const ReplayStats stats = advance_step<parts>(w, step, motion, state);
     if (team_rank() == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
-    const int kept = replay.kept_index[place];
+    const int kept = replay.kept_count > 0 ? replay.kept_index[at - replay.kept_begin] : -1;
     if (kept >= 0)
       keep(replay, state.positions,
            replay.kept + 3L * size * (static_cast<long>(replay.kept_count) * e + kept));
@@ -132,7 +132,7 @@ __global__ void __launch_bounds__(block_threads, 1)
     const int e = take(replay.waiting, &first);
     if (e < 0) return;
     const int interval = replay.restart_interval,
-              end = min(replay.waiting.end, (first / interval + 1) * interval);
+              end = min(replay.waiting.ends[e], (first / interval + 1) * interval);
     advance<parts>(common, e, first, end);
     synchronize_team();
     if (team_rank() == 0) give_back(replay.waiting, e, end, end - first);

@@ -212,9 +212,7 @@ void ProjectiveReplay::lay_out_teams(const ProjectiveSizes& sizes, int environme
   numbers_.teams = team_memory_.data();
 }
 
-void ProjectiveReplay::run(int begin, int end, cudaStream_t stream) {
-  numbers_.replay.waiting.begin = begin;
-  numbers_.replay.waiting.end = end;
+void ProjectiveReplay::run(cudaStream_t stream) const {
   run_projective(numbers_, precision_, teams(), blocks_, stream);
 }
 

@@ -31,8 +31,8 @@ class ProjectiveReplay {
 
   int team_blocks() const { return blocks_; }
   int teams() const { return static_cast<int>(team_memory_.size()); }
-  /// Queues the steps up to `end` of the environments that wait.
-  void run(int begin, int end, cudaStream_t stream);
+  /// Queues the steps of the environments that wait.
+  void run(cudaStream_t stream) const;
   /// Ticks that teams spent in each ProjectivePhase.
   std::vector<double> phase_ticks() const;
 

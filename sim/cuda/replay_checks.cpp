@@ -42,7 +42,8 @@ void check_replay(const SheetPlan& plan, const std::vector<ReplayEnvironment>& e
                   const ReplaySettings& settings) {
   require(settings.first_step >= 0 && settings.steps >= settings.first_step,
           "the steps have to ascend from first_step to steps");
-  require(settings.restart_interval > 0, "restart_interval has to be positive");
+  require(!environments.empty(), "no environments");
+  require(settings.restart_interval >= (settings.projective ? 1 : 0), "restart_interval has to be positive");
   require(settings.team_blocks >= 0 && settings.team_blocks <= most_team_blocks &&
               (settings.team_blocks & (settings.team_blocks - 1)) == 0,
           "team_blocks have to be 0, 1, 2, 4 or 8");
@@ -55,6 +56,9 @@ void check_replay(const SheetPlan& plan, const std::vector<ReplayEnvironment>& e
           "kept_steps have to lie between first_step and steps");
   const int size = plan.pattern.size;
   for (const ReplayEnvironment& e : environments) {
+    require(!settings.projective ||
+                &bending_operator(plan, e.material) == &bending_operator(plan, environments.front().material),
+            "with the projective method all environments need the same bending operator");
     require(e.positions.rows() == size && e.velocities.rows() == size,
             "every environment needs a position and a velocity for each vertex");
     require(e.bristles.rows() == 0 || e.bristles.rows() == size * std::ssize(e.obstacles),

@@ -38,9 +38,10 @@ struct CommonState {
 static_assert(sizeof(CommonState) <= common_memory);
 
 /// What a team works on an environment with.
-__device__ Work& begin_work(CommonState& common) {
-  const ReplayNumbers& replay = common.replay.get();
-  const TeamMemory& memory = common.memory.get();
+__device__ Work& begin_work(CommonState& common, int e) {
+  const ReplayNumbers& replay = common.replay.write([&](ReplayNumbers& own) { own.sheet = own.sheets[e]; });
+  const TeamMemory& memory =
+      common.memory.write([&](TeamMemory& own) { own.factor = replay.factors + e * replay.factor_numbers; });
   const auto iterate = [&](int k) {
     Iterate at = {};
     at.positions = memory.positions[k];
@@ -60,9 +61,33 @@ __device__ int work_of(const ReplayStats& stats) {
   return stats.solves + 2 * stats.iterations + 8 * stats.factorizations;
 }
 
-/// Takes an environment from its step `first` up to `end`. Returns the work that it took.
+/// Where an environment starts: with what its solver had at the end of the step before, or anew.
+__device__ void begin_solver(Work& w, StepProblem& step, const SolverState& kept, int first,
+                             const Point* positions) {
+  const int interval = w.replay.restart_interval;
+  if (kept.step == first && (interval == 0 || first % interval != 0)) {
+    change_common([&] {
+      w.refactor = kept.refactor != 0;
+      step.at_start = kept.at_start;
+      step.springs.count = kept.spring_count;
+      step.held_count = kept.held_count;
+    });
+    return;
+  }
+  for (int i = team_rank(); i < step.size; i += team_size()) w.now.positions[i] = positions[i];
+  evaluate(w, step, nullptr, w.now);
+  change_common([&] { step.at_start = w.now.elastic; });
+}
+
+/// Whether a step ended in numbers that are none, or too far from balance to go on.
+__device__ bool loses(const ReplayNumbers& replay, const ReplayStats& stats) {
+  return !isfinite(stats.residual) || stats.residual > replay.lost_residual;
+}
+
+/// Takes an environment from its step `first` up to `end`, or to that which loses it. Returns the work that
+/// it took, or -1 where it is lost.
 __device__ int advance(CommonState& common, int e, int first, int end) {
-  Work& w = begin_work(common);
+  Work& w = begin_work(common, e);
   const ReplayNumbers& replay = w.replay;
   const TeamMemory& memory = w.memory;
   const int size = replay.sheet.size;
@@ -87,30 +112,27 @@ __device__ int advance(CommonState& common, int e, int first, int end) {
            {},
            {}};
   });
-  // The energy that it starts with.
-  Iterate& now = w.now;
-  for (int i = team_rank(); i < size; i += team_size()) now.positions[i] = state.positions[i];
-  evaluate(w, step, nullptr, now);
+  begin_solver(w, step, replay.solvers[e], first, state.positions);
   int work = 0;
-  for (int at = first; at < end; ++at) {
-    const long row = static_cast<long>(material.motion) * replay.motion_steps + (at - replay.stats_begin);
+  bool lost = false;
+  for (int at = first; at < end && !lost; ++at) {
+    const long place = at - replay.waiting.begins[e],
+               row = static_cast<long>(replay.motions[e]) * replay.motion_steps + place,
+               stats_row = static_cast<long>(replay.stats_each) * e + place;
     const int* starts = replay.hold_starts + row;
     const int* spring_starts = replay.spring_starts + row;
-    const StepMotion motion = {
-        replay.holds + starts[0],
-        starts[1] - starts[0],
-        replay.springs + spring_starts[0],
-        spring_starts[1] - spring_starts[0],
-        replay.stiffness + static_cast<long>(replay.stiffness_each) * e,
-        replay.hold_forces +
-            3L * replay.hold_count * (static_cast<long>(replay.stats_each) * e + at - replay.stats_begin),
-        replay.obstacles + static_cast<long>(replay.most_obstacles_each) * e,
-        material.obstacle_count,
-        material.several,
-        replay.poses + row * replay.frames};
+    const StepMotion motion = {replay.holds + starts[0],
+                               starts[1] - starts[0],
+                               replay.springs + spring_starts[0],
+                               spring_starts[1] - spring_starts[0],
+                               replay.stiffness + static_cast<long>(replay.stiffness_each) * e,
+                               replay.hold_forces + 3 * replay.hold_count * stats_row,
+                               replay.obstacle_forces + 3 * replay.most_obstacles_each * stats_row,
+                               replay.obstacles + static_cast<long>(replay.most_obstacles_each) * e,
+                               material.obstacle_count,
+                               material.several,
+                               replay.poses + row * replay.frames};
     change_common([&] {
-      if (at == first) step.at_start = now.elastic;
-      if (at % replay.restart_interval == 0) w.refactor = true;
       // A factor does not know springs that come, nor that others have gone.
       if (motion.spring_count != step.springs.count ||
           (motion.spring_count > 0 && motion.held_count != step.held_count))
@@ -120,19 +142,21 @@ __device__ int advance(CommonState& common, int e, int first, int end) {
     });
     const ReplayStats stats = advance_step(w, step, motion, state);
     work += work_of(stats);
-    const long place = at - replay.stats_begin;
-    if (team_rank() == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
-    const int kept = replay.kept_index[place];
+    lost = loses(replay, stats);
+    if (team_rank() == 0) replay.stats[stats_row] = stats;
+    const int kept = replay.kept_count > 0 ? replay.kept_index[at - replay.kept_begin] : -1;
     if (kept >= 0)
       keep(replay, state.positions,
            replay.kept + 3L * size * (static_cast<long>(replay.kept_count) * e + kept));
   }
-  return work;
+  if (team_rank() == 0)
+    replay.solvers[e] = {lost ? -1 : end, w.refactor ? 1 : 0, step.springs.count, step.held_count,
+                         step.at_start};
+  return lost ? -1 : work;
 }
 
-/// A team takes an environment through some steps, until the solver forgets what it holds,
-/// and then takes the one with the most work left. So none waits for another, and all end at nearly the same
-/// time.
+/// A team takes an environment through some steps and then takes the one with the most work left. So none
+/// waits for another, and all end at nearly the same time.
 __global__ void __launch_bounds__(block_threads, resident_blocks_each)
     replay_kernel(const __grid_constant__ ReplayNumbers given) {
   __shared__ CommonState common;
@@ -143,12 +167,13 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
     int first = 0;
     const int e = take(replay.waiting, &first);
     if (e < 0) return;
-    const int interval = replay.restart_interval,
-              end = min(replay.waiting.end, (first / interval + 1) * interval);
+    const int last = replay.waiting.ends[e], interval = replay.restart_interval;
+    int end = min(last, (first / turn_steps + 1) * turn_steps);
+    if (interval > 0) end = min(end, (first / interval + 1) * interval);
     const int work = advance(common, e, first, end);
     count_phase(memory, ReplayPhase::rest);
     synchronize_team();
-    if (team_rank() == 0) give_back(replay.waiting, e, end, work);
+    if (team_rank() == 0) give_back(replay.waiting, e, work < 0 ? last : end, work);
   }
 }
 

@@ -1,10 +1,11 @@
 #include "sim/cuda/replay_memory.h"
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 #include <utility>
 
 #include "sim/cuda/device_arena.h"
-#include "sim/cuda/flat_motions.h"
 #include "sim/cuda/replay_checks.h"
 #include "sim/cuda/replay_kernel.h"
 #include "sim/law/membrane.h"
@@ -16,111 +17,70 @@ using data::Points;
 
 namespace {
 
-const BendingOperator& common_bending(const SheetPlan& plan,
-                                      const std::vector<ReplayEnvironment>& environments) {
-  require(!environments.empty(), "no environments");
-  const auto bending = [&](const ReplayEnvironment& e) -> const BendingOperator& {
-    return bending_operator(plan, e.material);
-  };
-  for (const ReplayEnvironment& e : environments)
-    require(&bending(e) == &bending(environments.front()), "all environments need the same bending operator");
-  return bending(environments.front());
-}
-
-ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& environment, int motion) {
+ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& environment) {
   const data::SheetMaterial& m = environment.material;
   const SheetLame lame = sheet_lame(m.membrane_stiffness, m.poissons_ratio);
   const Membrane membrane = membrane_of(m.constitutive, lame);
   const double gravity = environment.gravity.norm(), weight_factor = gravity > 0 ? gravity : 9.81;
-  return {membrane.law,
-          membrane.lame,
-          {lame.mu, m.constitutive == data::Constitutive::tri_arap ? 0 : lame.lambda},
-          m.membrane_stiffness,
-          m.bending_rigidity,
-          m.areal_density,
-          m.air_drag,
-          m.stiffness_damping,
-          {environment.gravity.x(), environment.gravity.y(), environment.gravity.z()},
-          weight_factor,
-          m.areal_density * plan.sheet.vertex_area.norm() * weight_factor,
-          2 * m.bending_rigidity * bending_operator(plan, m).flat_energy,
-          motion,
-          static_cast<int>(environment.obstacles.size()),
-          stand_beside(environment.obstacles)};
+  return {.law = membrane.law,
+          .lame = membrane.lame,
+          .damping = {lame.mu, m.constitutive == data::Constitutive::tri_arap ? 0 : lame.lambda},
+          .membrane_stiffness = m.membrane_stiffness,
+          .rigidity = m.bending_rigidity,
+          .areal_density = m.areal_density,
+          .air_drag = m.air_drag,
+          .stiffness_damping = m.stiffness_damping,
+          .gravity = {environment.gravity.x(), environment.gravity.y(), environment.gravity.z()},
+          .weight_factor = weight_factor,
+          .force_scale = m.areal_density * plan.sheet.vertex_area.norm() * weight_factor,
+          .bending_rounding = 2 * m.bending_rigidity * bending_operator(plan, m).flat_energy,
+          .obstacle_count = static_cast<int>(environment.obstacles.size()),
+          .several = stand_beside(environment.obstacles)};
 }
+
+std::size_t most_obstacles_of(const std::vector<ReplayEnvironment>& environments) {
+  std::size_t most = 0;
+  for (const ReplayEnvironment& e : environments) most = std::max(most, e.obstacles.size());
+  return most;
+}
+
+/// Rows of `points` from `first` on in the order of elimination; zeros where there are none.
+void put_in_order(const Points& points, Eigen::Index first, const std::vector<int>& order, Point* to) {
+  for (const int vertex : order) {
+    const Eigen::Index row = first + vertex;
+    *to++ = row < points.rows() ? Point{points(row, 0), points(row, 1), points(row, 2), 0} : Point{};
+  }
+}
+
+std::vector<PlacedObstacle> placed_obstacles(const ReplayEnvironment& environment) {
+  std::vector<PlacedObstacle> placed;
+  for (const Obstacle& obstacle : environment.obstacles)
+    placed.push_back({obstacle_in_frame(obstacle, environment.material.friction), obstacle.frame});
+  return placed;
+}
+
+constexpr SolverState no_solver = {
+    .step = -1, .refactor = 1, .spring_count = 0, .held_count = 0, .at_start = {}};
 
 }  // namespace
 
-ReplayMemory::ReplayMemory(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments,
-                           ReplaySettings replay_settings)
+ReplayMemory::ReplayMemory(std::shared_ptr<const SheetPlan> sheet,
+                           const std::vector<ReplayEnvironment>& environments, ReplaySettings replay_settings)
     : settings(std::move(replay_settings)),
       count(static_cast<int>(environments.size())),
-      step(settings.first_step),
-      front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting_fronts(settings.fronts))),
-      layout(lay_out(sheet, common_bending(sheet, environments), front_plan)),
-      plan(front_plan, layout) {
-  upload_state(environments);
-  const MostHeld most_held = upload_motions(sheet, environments);
-  upload_stiffness(environments);
-  const int all_steps = settings.steps - settings.first_step;
-  stats = DeviceArray<ReplayStats>(static_cast<std::size_t>(all_steps) * environments.size());
-  upload_kept_steps();
-  const bool damped = std::any_of(environments.begin(), environments.end(),
-                                  [](const auto& e) { return e.material.stiffness_damping != 0; });
-  const int most_obstacles_each = upload_obstacles(environments);
-  upload_bristles(environments, most_obstacles_each);
-  if (!settings.projective) {
-    plan_stages();
-    lay_out_teams({plan.fronts, layout, damped, most_held.springs, most_held.vertices, most_obstacles_each});
-  }
-  steps = DeviceArray<int>(environments.size());
-  work = DeviceArray<int>(environments.size());
-  unfinished = DeviceArray<int>(1);
-
-  numbers.fronts = plan.fronts;
-  numbers.sheet = plan.sheet;
-  numbers.teams = team_memory.data();
-  check(cudaMallocHost(&stop, sizeof(int)));
-  *stop = 0;
-  numbers.waiting = {steps.data(), work.data(), unfinished.data(), count, 0, 0, 0, stop};
-  numbers.time_step = settings.time_step;
-  numbers.tolerance = settings.tolerance;
-  numbers.max_iterations = settings.max_iterations;
-  numbers.stale_factor_solves = settings.stale_factor_solves;
-  numbers.halvings = settings.halvings;
-  numbers.restart_interval = settings.restart_interval;
-  numbers.stats_begin = settings.first_step;
-  numbers.stats_each = all_steps;
-  numbers.materials = materials.data();
-  numbers.loads = loads.data();
-  numbers.hold_starts = hold_starts.data();
-  numbers.motion_steps = all_steps + 1;
-  numbers.holds = holds.data();
-  numbers.spring_starts = spring_starts.data();
-  numbers.springs = springs.data();
-  numbers.stiffness = stiffness.data();
-  numbers.obstacles = obstacles.data();
-  numbers.most_obstacles_each = most_obstacles_each;
-  numbers.poses = poses.data();
-  numbers.exit_speed = settings.exit_speed;
-  numbers.states = {positions.data(), velocities.data(), bristles.data()};
-  numbers.stats = stats.data();
-  numbers.hold_count = environments.front().hold_count;
-  hold_forces = DeviceArray<double>(3 * stats.size() * static_cast<std::size_t>(numbers.hold_count));
-  numbers.hold_forces = hold_forces.data();
-  numbers.kept_index = kept_index.data();
-  numbers.kept_count = static_cast<int>(settings.kept_steps.size());
-  numbers.order = order.data();
-  numbers.kept = kept.data();
+      most_obstacles_each(static_cast<int>(most_obstacles_of(environments))),
+      front_plan(plan_fronts(sheet->pattern, sheet->sheet.rest.vertices, fitting_fronts(settings.fronts))),
+      layout(lay_out(*sheet, bending_operator(*sheet, environments.front().material), front_plan)),
+      plan(front_plan, layout),
+      tables(count, layout.size, environments.front().hold_count, most_obstacles_each),
+      sheet_(std::move(sheet)),
+      bendings_(environments.size()),
+      plan_bending_(&bending_operator(*sheet_, environments.front().material)) {
+  if (!settings.projective) plan_teams();
+  upload(environments);
+  if (!settings.projective) lay_out_teams();
+  set_numbers(environments.front());
   check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
-  keep_start(environments);
-  if (!settings.projective) return;
-  projection = std::make_unique<ProjectiveReplay>(
-      ProjectiveSizes{sheet, layout, front_plan.position, damped, most_obstacles_each}, environments,
-      settings, numbers);
-  teams = projection->teams();
-  team_blocks = projection->team_blocks();
-  require(teams > 0, "the sheet is too large for the device");
 }
 
 ReplayMemory::~ReplayMemory() {
@@ -130,125 +90,243 @@ ReplayMemory::~ReplayMemory() {
 
 std::size_t ReplayMemory::size() const { return layout.order.size(); }
 
-void ReplayMemory::wait() const {
+void ReplayMemory::wait(const std::atomic<bool>* asked) const {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::milliseconds pause(1);
   use_device(device);
+  // A single step may take less than a pause.
+  const auto begin = Clock::now();
+  while (asked != nullptr && !*asked && cudaStreamQuery(stream) == cudaErrorNotReady)
+    if (Clock::now() - begin > pause) std::this_thread::sleep_for(pause);
+  if (asked != nullptr && *asked) *stop = 1;
   check(cudaStreamSynchronize(stream));
 }
 
-void ReplayMemory::upload_state(const std::vector<ReplayEnvironment>& environments) {
-  std::vector<Point> x, v, forces;
-  const bool loaded = std::any_of(environments.begin(), environments.end(),
-                                  [](const ReplayEnvironment& e) { return !e.loads.empty(); });
-  for (const ReplayEnvironment& e : environments) {
-    Points load = Points::Zero(e.positions.rows(), 3);
-    for (const Load& one : e.loads) load.row(one.vertex) += one.force.transpose();
-    for (const int vertex : layout.order) {
-      const auto point = [vertex](const Points& p) {
-        return Point{p(vertex, 0), p(vertex, 1), p(vertex, 2), 0};
-      };
-      x.push_back(point(e.positions));
-      v.push_back(point(e.velocities));
-      if (loaded) forces.push_back(point(load));
-    }
+void ReplayMemory::use_projective_method(const SheetPlan& sheet,
+                                         const std::vector<ReplayEnvironment>& environments) {
+  const bool damped = std::any_of(environments.begin(), environments.end(),
+                                  [](const auto& e) { return e.material.stiffness_damping != 0; });
+  projection = std::make_unique<ProjectiveReplay>(
+      ProjectiveSizes{sheet, layout, front_plan.position, damped, most_obstacles_each}, environments,
+      settings, numbers);
+  teams = projection->teams();
+  team_blocks = projection->team_blocks();
+  require(teams > 0, "the sheet is too large for the device");
+}
+
+void ReplayMemory::set_numbers(const ReplayEnvironment& first) {
+  check(cudaMallocHost(&stop, sizeof(int)));
+  *stop = 0;
+  numbers.fronts = plan.fronts;
+  numbers.sheet = plan.sheet;
+  numbers.sheets = sheets.data();
+  numbers.teams = team_memory.data();
+  numbers.solvers = solvers.data();
+  numbers.factors = factors.data();
+  numbers.factor_numbers = solve_tile_numbers * static_cast<long>(plan.fronts.factor_tiles);
+  numbers.waiting.stop = stop;
+  numbers.time_step = settings.time_step;
+  numbers.tolerance = settings.tolerance;
+  numbers.lost_residual = settings.lost_residual;
+  numbers.max_iterations = settings.max_iterations;
+  numbers.stale_factor_solves = settings.stale_factor_solves;
+  numbers.halvings = settings.halvings;
+  numbers.restart_interval = settings.restart_interval;
+  numbers.materials = materials.data();
+  numbers.obstacles = obstacles.data();
+  numbers.most_obstacles_each = most_obstacles_each;
+  numbers.exit_speed = settings.exit_speed;
+  numbers.states = {positions.data(), velocities.data(), bristles.data()};
+  numbers.hold_count = first.hold_count;
+  numbers.order = order.data();
+}
+
+void ReplayMemory::upload(const std::vector<ReplayEnvironment>& environments) {
+  const std::size_t vertices = size(), layers = static_cast<std::size_t>(most_obstacles_each),
+                    all = environments.size() * vertices;
+  std::vector<Point> x(all), v(all), b(all * layers);
+  std::vector<ReplayMaterial> own_materials;
+  std::vector<PlacedObstacle> placed;
+  std::vector<SheetTables> own_sheets;
+  for (std::size_t e = 0; e < environments.size(); ++e) {
+    const ReplayEnvironment& own = environments[e];
+    put_in_order(own.positions, 0, layout.order, x.data() + e * vertices);
+    put_in_order(own.velocities, 0, layout.order, v.data() + e * vertices);
+    put_bristles(own.bristles, b.data() + e * layers * vertices);
+    own_materials.push_back(material_of(*sheet_, own));
+    own_sheets.push_back(with_bending_of(own.material, static_cast<int>(e)));
+    const std::vector<PlacedObstacle> of_own = placed_obstacles(own);
+    placed.insert(placed.end(), of_own.begin(), of_own.end());
+    placed.resize((e + 1) * layers);
+    obstacle_counts.push_back(static_cast<int>(own.obstacles.size()));
   }
+  order = DeviceArray<int>(layout.order);
   positions = DeviceArray<Point>(x);
   velocities = DeviceArray<Point>(v);
-  loads = DeviceArray<Point>(forces);
-  order = DeviceArray<int>(layout.order);
-}
-
-void ReplayMemory::upload_bristles(const std::vector<ReplayEnvironment>& environments,
-                                   int most_obstacles_each) {
-  std::vector<Point> all;
-  for (const ReplayEnvironment& e : environments) {
-    for (int k = 0; k < most_obstacles_each; ++k)
-      for (const int vertex : layout.order) {
-        const Eigen::Index row = static_cast<Eigen::Index>(k) * layout.size + vertex;
-        all.push_back(row < e.bristles.rows()
-                          ? Point{e.bristles(row, 0), e.bristles(row, 1), e.bristles(row, 2), 0}
-                          : Point{});
-      }
+  bristles = DeviceArray<Point>(b);
+  materials = DeviceArray<ReplayMaterial>(own_materials);
+  obstacles = DeviceArray<PlacedObstacle>(placed);
+  sheets = DeviceArray<SheetTables>(own_sheets);
+  solvers = DeviceArray<SolverState>(std::vector<SolverState>(environments.size(), no_solver));
+  if (!settings.projective)
+    factors = DeviceArray<__half>(environments.size() * solve_tile_numbers *
+                                  static_cast<std::size_t>(plan.fronts.factor_tiles));
+  for (std::size_t e = 0; e < environments.size(); ++e) {
+    write_loads(environments[e], e);
+    write_stiffness(environments[e].stiffness, e);
   }
-  bristles = DeviceArray<Point>(all);
 }
 
-ReplayMemory::MostHeld ReplayMemory::upload_motions(const SheetPlan& sheet,
-                                                    const std::vector<ReplayEnvironment>& environments) {
-  FlatMotions flat;
-  for (const ReplayEnvironment& e : environments)
-    if (e.schedule != nullptr)
-      flat.frames = std::max(flat.frames, static_cast<int>(e.schedule->frames.size()));
-  numbers.frames = flat.frames;
-  std::vector<ReplayMaterial> all;
-  for (const ReplayEnvironment& e : environments) {
-    const int motion =
-        flat.add(e, settings.time_step, settings.steps - settings.first_step, front_plan.position);
-    all.push_back(material_of(sheet, e, motion));
+void ReplayMemory::put_bristles(const Points& own, Point* to) const {
+  for (int k = 0; k < most_obstacles_each; ++k)
+    put_in_order(own, static_cast<Eigen::Index>(k) * layout.size, layout.order,
+                 to + static_cast<std::size_t>(k) * size());
+}
+
+void ReplayMemory::write_state(int environment, const Points& x, const Points& v,
+                               const Points& own_bristles) {
+  use_device(device);
+  const std::size_t vertices = size(), e = static_cast<std::size_t>(environment),
+                    layers = static_cast<std::size_t>(most_obstacles_each);
+  std::vector<Point> points(vertices), layered(layers * vertices);
+  put_in_order(x, 0, layout.order, points.data());
+  positions.write(e * vertices, points.data(), vertices);
+  put_bristles(own_bristles, layered.data());
+  bristles.write(e * layers * vertices, layered.data(), layered.size());
+  write_velocities(environment, v);
+  forget_solver(environment);
+}
+
+void ReplayMemory::write_velocities(int environment, const Points& v) {
+  use_device(device);
+  std::vector<Point> points(size());
+  put_in_order(v, 0, layout.order, points.data());
+  velocities.write(static_cast<std::size_t>(environment) * size(), points.data(), size());
+}
+
+SheetTables ReplayMemory::with_bending_of(const data::SheetMaterial& material, int environment) {
+  SheetTables own = plan.sheet;
+  std::shared_ptr<const DeviceBending>& bending = bendings_[static_cast<std::size_t>(environment)];
+  bending.reset();
+  const BendingOperator& asked = bending_operator(*sheet_, material);
+  if (&asked == plan_bending_) return own;
+  std::weak_ptr<const DeviceBending>& shared = shared_bendings_[&asked];
+  bending = shared.lock();
+  if (bending == nullptr)
+    shared = bending = std::make_shared<const DeviceBending>(lay_out_bending(*sheet_, asked, front_plan));
+  bending->put(own);
+  return own;
+}
+
+void ReplayMemory::write_environment(const ReplayEnvironment& environment, int number) {
+  use_device(device);
+  const auto e = static_cast<std::size_t>(number);
+  const ReplayMaterial material = material_of(*sheet_, environment);
+  materials.write(e, &material, 1);
+  const std::vector<PlacedObstacle> placed = placed_obstacles(environment);
+  obstacles.write(e * static_cast<std::size_t>(most_obstacles_each), placed.data(), placed.size());
+  obstacle_counts[e] = static_cast<int>(placed.size());
+  const SheetTables own = with_bending_of(environment.material, number);
+  sheets.write(e, &own, 1);
+  write_loads(environment, e);
+  write_stiffness(environment.stiffness, e);
+  forget_solver(number);
+}
+
+void ReplayMemory::write_loads(const ReplayEnvironment& environment, std::size_t number) {
+  if (environment.loads.empty() && loads.size() == 0) return;
+  loads.hold(positions.size());
+  numbers.loads = loads.data();
+  Points sums = Points::Zero(layout.size, 3);
+  for (const Load& load : environment.loads) sums.row(load.vertex) += load.force.transpose();
+  std::vector<Point> points(size());
+  put_in_order(sums, 0, layout.order, points.data());
+  loads.write(number * size(), points.data(), size());
+}
+
+void ReplayMemory::write_stiffness(const std::vector<double>& own, std::size_t number) {
+  const auto each = static_cast<std::size_t>(numbers.stiffness_each);
+  if (own.size() > each) {
+    const std::vector<double> before = stiffness.read(0, stiffness.size());
+    std::vector<double> grown(own.size() * static_cast<std::size_t>(count));
+    for (std::size_t k = 0; k < before.size(); ++k) grown[k / each * own.size() + k % each] = before[k];
+    stiffness = DeviceArray<double>(grown);
+    numbers.stiffness = stiffness.data();
+    numbers.stiffness_each = static_cast<int>(own.size());
   }
-  poses = DeviceArray<FramePose>(flat.poses);
-  materials = DeviceArray<ReplayMaterial>(all);
-  hold_starts = DeviceArray<int>(flat.starts);
-  holds = DeviceArray<HeldPlace>(flat.holds);
-  spring_starts = DeviceArray<int>(flat.spring_starts);
-  springs = DeviceArray<SpringPlace>(flat.springs);
-  return {flat.most, !flat.springs.empty()};
+  stiffness.write(number * static_cast<std::size_t>(numbers.stiffness_each), own.data(), own.size());
 }
 
-void ReplayMemory::upload_stiffness(const std::vector<ReplayEnvironment>& environments) {
-  std::size_t most = 0;
-  for (const ReplayEnvironment& e : environments) most = std::max(most, e.stiffness.size());
-  std::vector<double> all;
-  for (const ReplayEnvironment& e : environments) {
-    all.insert(all.end(), e.stiffness.begin(), e.stiffness.end());
-    all.resize((static_cast<std::size_t>(&e - environments.data()) + 1) * most);
+void ReplayMemory::forget_solver(int environment) {
+  use_device(device);
+  solvers.write(static_cast<std::size_t>(environment), &no_solver, 1);
+}
+
+template <typename Act>
+void ReplayMemory::for_state(int environment, const Act& act) const {
+  const auto e = static_cast<std::size_t>(environment);
+  const std::size_t vertices = size(), layers = static_cast<std::size_t>(most_obstacles_each);
+  const auto part = [&](auto* all, std::size_t each, std::size_t used) {
+    act(reinterpret_cast<char*>(all + e * each), used * sizeof(*all));
+  };
+  part(positions.data(), vertices, vertices);
+  part(velocities.data(), vertices, vertices);
+  part(bristles.data(), layers * vertices, static_cast<std::size_t>(obstacle_counts[e]) * vertices);
+  part(solvers.data(), 1, 1);
+  const auto factor = static_cast<std::size_t>(numbers.factor_numbers);
+  part(factors.data(), factor, factor);
+}
+
+std::vector<char> ReplayMemory::save(int environment) const {
+  use_device(device);
+  std::vector<char> saved;
+  for_state(environment, [&](const char* from, std::size_t bytes) {
+    if (bytes == 0) return;
+    const std::size_t at = saved.size();
+    saved.resize(at + bytes);
+    copy_to_end(saved.data() + at, from, bytes, cudaMemcpyDeviceToHost);
+  });
+  return saved;
+}
+
+void ReplayMemory::load(int environment, const std::vector<char>& saved) {
+  use_device(device);
+  std::size_t expected = 0, at = 0;
+  for_state(environment, [&](const char*, std::size_t bytes) { expected += bytes; });
+  require(saved.size() == expected, "what was saved is of another mesh or has other obstacles");
+  for_state(environment, [&](char* to, std::size_t bytes) {
+    if (bytes > 0) copy_to_end(to, saved.data() + at, bytes, cudaMemcpyHostToDevice);
+    at += bytes;
+  });
+}
+
+std::vector<TeamStage> ReplayMemory::stages_for(int environments, int steps) const {
+  const auto resident = [&](int blocks) { return resident_.at(blocks); };
+  if (const int blocks = settings.team_blocks; blocks > 0)
+    return {{blocks, std::min(environments, resident(blocks)), 0}};
+  return team_stages(environments, steps > turn_steps ? 2 : 1, resident_.rbegin()->first, resident);
+}
+
+void ReplayMemory::plan_teams() {
+  const int most_blocks = launches_clusters() ? most_team_blocks : 1;
+  for (int blocks = 1; blocks <= most_blocks; blocks *= 2) {
+    if (settings.team_blocks > 0 && blocks != settings.team_blocks) continue;
+    resident_[blocks] = resident_replay_teams(plan.fronts, blocks);
+    fronts_[blocks] = plan.shared_out(front_plan, blocks);
   }
-  stiffness = DeviceArray<double>(all);
-  numbers.stiffness_each = static_cast<int>(most);
-}
-
-int ReplayMemory::upload_obstacles(const std::vector<ReplayEnvironment>& environments) {
-  std::size_t most = 0;
-  for (const ReplayEnvironment& e : environments) {
-    obstacle_counts.push_back(static_cast<int>(e.obstacles.size()));
-    most = std::max(most, e.obstacles.size());
+  require(!resident_.empty(), "the device has no teams of several blocks");
+  for (const auto& [blocks, fronts] : fronts_)
+    plan.fronts.vector_size = std::max(plan.fronts.vector_size, fronts.vector_size);
+  for (const int steps : {turn_steps, turn_steps + 1}) {
+    const std::vector<TeamStage> stages = stages_for(count, steps);
+    require(!stages.empty() && stages.front().teams > 0, "the sheet is too large for the device");
+    for (const TeamStage& stage : stages) teams = std::max(teams, stage.teams);
+    team_blocks = stages.front().blocks;
   }
-  std::vector<PlacedObstacle> all;
-  for (const ReplayEnvironment& e : environments) {
-    for (const Obstacle& obstacle : e.obstacles)
-      all.push_back({obstacle_in_frame(obstacle, e.material.friction), obstacle.frame});
-    all.resize((static_cast<std::size_t>(&e - environments.data()) + 1) * most);
-  }
-  obstacles = DeviceArray<PlacedObstacle>(all);
-  return static_cast<int>(most);
 }
 
-void ReplayMemory::upload_kept_steps() {
-  const int all_steps = settings.steps - settings.first_step;
-  std::vector<int> index(static_cast<std::size_t>(all_steps), -1);
-  for (std::size_t k = 0; k < settings.kept_steps.size(); ++k)
-    if (settings.kept_steps[k] > settings.first_step)
-      index[static_cast<std::size_t>(settings.kept_steps[k] - settings.first_step - 1)] = static_cast<int>(k);
-  kept_index = DeviceArray<int>(index);
-  kept = DeviceArray<double>(static_cast<std::size_t>(count) * settings.kept_steps.size() * 3 * size());
-}
-
-void ReplayMemory::plan_stages() {
-  const int turns = settings.steps - settings.first_step > settings.restart_interval ? 2 : 1;
-  const auto resident = [&](int blocks) { return resident_replay_teams(plan.fronts, blocks); };
-  if (settings.team_blocks > 0)
-    stages = {{settings.team_blocks, std::min(count, resident(settings.team_blocks)), 0}};
-  else
-    stages = team_stages(count, turns, launches_clusters() ? most_team_blocks : 1, resident);
-  require(!stages.empty() && stages.front().teams > 0, "the sheet is too large for the device");
-  for (const TeamStage& stage : stages) {
-    stage_fronts.push_back(plan.shared_out(front_plan, stage.blocks));
-    plan.fronts.vector_size = std::max(plan.fronts.vector_size, stage_fronts.back().vector_size);
-    teams = std::max(teams, stage.teams);
-  }
-  team_blocks = stages.front().blocks;
-}
-
-void ReplayMemory::lay_out_teams(const TeamSizes& sizes) {
+void ReplayMemory::lay_out_teams() {
+  const TeamSizes sizes = {plan.fronts, layout, static_cast<int>(sheet_->hinges.size()), most_obstacles_each};
   DeviceArena counting(nullptr);
   lay_out_team(sizes, counting);
   const std::size_t bytes = counting.used();
@@ -263,39 +341,55 @@ void ReplayMemory::lay_out_teams(const TeamSizes& sizes) {
   team_memory = DeviceArray<TeamMemory>(all);
 }
 
+void ReplayMemory::open(const StepPlan& steps) {
+  use_device(device);
+  tables.open(steps, stream);
+  tables.put(numbers);
+}
+
 void ReplayMemory::keep_start(const std::vector<ReplayEnvironment>& environments) {
   if (settings.kept_steps.empty() || settings.kept_steps.front() != settings.first_step) return;
-  for (std::size_t e = 0; e < environments.size(); ++e)
-    kept.write(e * settings.kept_steps.size() * 3 * size(), environments[e].positions.data(), 3 * size());
+  for (int e = 0; e < count; ++e)
+    copy_to_end(numbers.kept + static_cast<std::size_t>(e) * settings.kept_steps.size() * 3 * size(),
+                environments[static_cast<std::size_t>(e)].positions.data(), 3 * size() * sizeof(double),
+                cudaMemcpyHostToDevice);
 }
 
-void ReplayMemory::advance(int more) {
-  require(more >= 0 && more <= settings.steps - step, "it cannot advance beyond its last step");
-  if (more == 0) return;
-  const int end = step + more;
-  wait();
-  const std::vector<int> stand(static_cast<std::size_t>(count), step);
-  steps.write(0, stand.data(), stand.size());
-  work.write(0, std::vector<int>(stand.size(), 0).data(), stand.size());
-  unfinished.write(0, &count, 1);
-  if (projection)
-    projection->run(step, end, stream);
-  else
-    run_stages(end);
-  step = end;
+void ReplayMemory::run(const StepPlan& steps) {
+  open(steps);
+  int environments = 0;
+  for (std::size_t e = 0; e < steps.begins.size(); ++e)
+    environments += steps.begins[e] < steps.ends[e] ? 1 : 0;
+  launch_steps(environments, steps.most_steps());
 }
 
-void ReplayMemory::run_stages(int end) const {
-  for (std::size_t k = 0; k < stages.size(); ++k) {
-    const TeamStage& stage = stages[k];
+void ReplayMemory::go_on(int begin, int end) {
+  tables.queue(begin, end, stream);
+  launch_steps(count, end - begin);
+}
+
+void ReplayMemory::launch_steps(int environments, int steps) {
+  if (projection) return projection->run(stream);
+  for (const TeamStage& stage : stages_for(environments, steps)) {
     ReplayNumbers own = numbers;
-    own.fronts = stage_fronts[k];
-    own.waiting.begin = step;
-    own.waiting.end = end;
+    own.fronts = fronts_.at(stage.blocks);
     own.waiting.leave_at = stage.leave_at;
     place_on_chip(own, stage.blocks);
     run_replay(own, stage.teams, stage.blocks, stream);
   }
+}
+
+std::vector<double> ReplayMemory::phase_ticks() const {
+  wait();
+  if (projection) return projection->phase_ticks();
+  std::vector<double> ticks(replay_phases, 0.0);
+  for (const TeamMemory& team : team_memory.read(0, team_memory.size())) {
+    long long clocks[replay_phases];
+    copy_to_end(clocks, team.clocks, sizeof(clocks), cudaMemcpyDeviceToHost);
+    for (int k = 0; k < replay_phases; ++k)
+      ticks[static_cast<std::size_t>(k)] += static_cast<double>(clocks[k]);
+  }
+  return ticks;
 }
 
 Points ReplayMemory::points(const DeviceArray<Point>& array, std::size_t part) const {

@@ -1,6 +1,7 @@
 #pragma once
 #include <cuda_runtime.h>
 
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -12,15 +13,17 @@
 #include "sim/cuda/layout/team_stages.h"
 #include "sim/cuda/projective_replay.h"
 #include "sim/cuda/replay_numbers.h"
+#include "sim/cuda/step_tables.h"
 #include "sim/cuda/team_memory.h"
 
 namespace flash::sim::cuda {
 
-/// What a replay has on the device, and how it goes on there.
+/// Environments on the device, each with what its solver keeps of it from step to step, and the teams that
+/// step them. What a step gives depends on these alone, bitwise, whatever steps are queued together.
 struct ReplayMemory {
   ReplaySettings settings;
   int device = device_in_use();
-  int count, step;
+  int count, most_obstacles_each;
   FrontPlan front_plan;
   SheetLayout layout;
   DevicePlan plan;
@@ -30,62 +33,89 @@ struct ReplayMemory {
   std::vector<int> obstacle_counts;  ///< of each environment
   DeviceArray<ReplayMaterial> materials;
   DeviceArray<Point> positions, velocities, bristles, loads;
-  DeviceArray<int> hold_starts, kept_index, order, steps, work, unfinished;
-  DeviceArray<HeldPlace> holds;
-  DeviceArray<int> spring_starts;
-  DeviceArray<SpringPlace> springs;
+  DeviceArray<int> order;
   DeviceArray<double> stiffness;
   DeviceArray<PlacedObstacle> obstacles;
-  DeviceArray<FramePose> poses;
-  DeviceArray<ReplayStats> stats;
-  DeviceArray<double> kept, hold_forces;
+  DeviceArray<SheetTables> sheets;
+  DeviceArray<SolverState> solvers;
+  DeviceArray<__half> factors;
   DeviceArray<char> arena;
   DeviceArray<TeamMemory> team_memory;
   int teams = 0, team_blocks = 1;  ///< at first
   ReplayNumbers numbers{};
-  std::vector<TeamStage> stages;
-  std::vector<FrontTables> stage_fronts;
+  StepTables tables;                             ///< of the steps at hand
   std::unique_ptr<ProjectiveReplay> projection;  ///< of the projective method
 
-  ReplayMemory(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments,
+  /// Environments as they stand, without their motions.
+  ReplayMemory(std::shared_ptr<const SheetPlan> sheet, const std::vector<ReplayEnvironment>& environments,
                ReplaySettings replay_settings);
   ~ReplayMemory();
+  ReplayMemory(const ReplayMemory&) = delete;
 
   std::size_t size() const;
 
-  /// For what is queued; whoever comes next on this thread works with the device.
-  void wait() const;
+  /// For what is queued; whoever comes next on this thread works with the device. Once `stop` is set the
+  /// device ends after the steps that its teams are at, and the results are of no use.
+  void wait(const std::atomic<bool>* stop = nullptr) const;
 
-  /// Queues so many steps.
-  void advance(int more);
+  /// The projective method takes the steps from now on. All environments have the same bending operator.
+  void use_projective_method(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments);
+
+  // Once what was queued has ended:
+
+  void write_state(int environment, const data::Points& positions, const data::Points& velocities,
+                   const data::Points& bristles);
+  void write_velocities(int environment, const data::Points& velocities);
+  /// Material, gravity, loads, stiffness and obstacles. The solver starts anew: what it has is of others.
+  void write_environment(const ReplayEnvironment& environment, int number);
+  /// The next step of an environment starts as that of a new one.
+  void forget_solver(int environment);
+  /// All that the device has of an environment but for its material, as bytes of memory.
+  std::vector<char> save(int environment) const;
+  /// Throws std::invalid_argument for what was saved of another mesh or with other obstacles.
+  void load(int environment, const std::vector<char>& saved);
+
+  /// Queues the tables of a plan.
+  void open(const StepPlan& steps);
+  /// Queues the steps of a plan.
+  void run(const StepPlan& steps);
+  /// Queues steps of an open plan, from `begin` up to `end` of all environments.
+  void go_on(int begin, int end);
+
+  /// The positions at the start are those of kept step 0, where that is the first one.
+  void keep_start(const std::vector<ReplayEnvironment>& environments);
 
   /// A part of an array with a point for each vertex.
   data::Points points(const DeviceArray<Point>& array, std::size_t part) const;
 
+  /// Ticks that the teams' first processors spent in each phase.
+  std::vector<double> phase_ticks() const;
+
  private:
-  void upload_state(const std::vector<ReplayEnvironment>& environments);
+  /// act(where it is on the device, bytes) for each part of an environment's state.
+  template <typename Act>
+  void for_state(int environment, const Act& act) const;
 
-  /// Each environment has room for `most_obstacles_each`.
-  void upload_bristles(const std::vector<ReplayEnvironment>& environments, int most_obstacles_each);
+  std::shared_ptr<const SheetPlan> sheet_;
+  std::map<int, int> resident_;        ///< teams that the device runs at once, by their blocks
+  std::map<int, FrontTables> fronts_;  ///< by the blocks of a team
+  std::vector<std::shared_ptr<const DeviceBending>> bendings_;  ///< of each environment; null: the plan's
+  std::map<const BendingOperator*, std::weak_ptr<const DeviceBending>> shared_bendings_;
+  const BendingOperator* plan_bending_;
 
-  /// What is held at once, at most.
-  struct MostHeld {
-    int vertices;
-    bool springs;  ///< whether there are any
-  };
-  MostHeld upload_motions(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments);
+  void upload(const std::vector<ReplayEnvironment>& environments);
+  /// Each environment has room for most_obstacles_each.
+  void put_bristles(const data::Points& own, Point* to) const;
+  void write_loads(const ReplayEnvironment& environment, std::size_t number);
+  void write_stiffness(const std::vector<double>& own, std::size_t number);
+  void set_numbers(const ReplayEnvironment& first);
+  SheetTables with_bending_of(const data::SheetMaterial& material, int environment);
 
-  void upload_stiffness(const std::vector<ReplayEnvironment>& environments);
-
-  /// Returns how many obstacles an environment has at most.
-  int upload_obstacles(const std::vector<ReplayEnvironment>& environments);
-  void upload_kept_steps();
-
-  /// Where an environment has but one turn with a team, none waits for a second one.
-  void plan_stages();
-  void lay_out_teams(const TeamSizes& sizes);
-  void keep_start(const std::vector<ReplayEnvironment>& environments);
-  void run_stages(int end) const;
+  /// For so many environments. Where one has but one turn with a team, none waits for a second one.
+  std::vector<TeamStage> stages_for(int environments, int steps) const;
+  void plan_teams();
+  void lay_out_teams();
+  void launch_steps(int environments, int steps);
 };
 
 std::vector<ReplayStep> steps_of(std::span<const ReplayStats> stats);

@@ -23,7 +23,6 @@ struct ReplayMaterial {
   double weight_factor;     ///< |gravity|, 9.81 without [m/s^2]
   double force_scale;       ///< |M g| [N]
   double bending_rounding;  ///< of the energies of bending at both ends of a step [J]
-  int motion;               ///< of what holds it
   int obstacle_count;
   bool several;  ///< whether a box stands beside another obstacle
 };
@@ -67,8 +66,10 @@ struct SpringPlace {
 
 /// How one step of one environment went.
 struct ReplayStats {
-  double residual;     ///< |r| / |M g|
-  double penetration;  ///< deepest vertex below a surface [m]
+  double residual;                    ///< |r| / |M g|
+  double penetration;                 ///< deepest vertex below a surface [m]
+  double complementarity;             ///< as in StepReport [m]
+  double kinetic, membrane, bending;  ///< energies at the end [J]
   int iterations, solves, factorizations, substeps;
   int converged;
 };
@@ -96,7 +97,7 @@ struct TeamMemory {
   double* residuals[3];    ///< what the constraints leave of it [N]
   ContactSet contacts[4];  ///< of the iterates and of the linear problem; null without obstacles
   float* own_blocks;       ///< what contact and springs add to the diagonal of the matrix, nine numbers a
-                           ///< vertex; null without both
+                           ///< vertex
   int* held_axes;          ///< by place: bits 1, 2 and 4 for x, y and z
   CoupledMemory coupled;   ///< null without obstacles
   float *gradient, *direction, *change;
@@ -104,10 +105,10 @@ struct TeamMemory {
   float* solved;  ///< FrontTables::vector_size
   Four<float>* search;
   float *shares, *updates, *block_rows, *blocks;
-  __half* factor;  ///< zeros where nothing is stored
+  __half* factor;  ///< of the environment at hand; zeros where nothing is stored
   double *triangle_gradients, *hinge_gradients;
   float *hinge_matrix, *hinge_products;
-  double *start_metrics, *start_angles;  ///< null where nothing is damped
+  double *start_metrics, *start_angles;
   Point* bent;
   double* damped;
   VertexRestriction* restrictions;
@@ -127,21 +128,36 @@ struct SheetState {
   }
 };
 
+/// What a solver keeps of an environment from step to step besides its factor.
+struct SolverState {
+  int step;                      ///< at which it goes on; another one: it starts anew
+  int refactor;                  ///< whether the next solve needs a new factor
+  int spring_count, held_count;  ///< of the last step
+  ElasticEnergies at_start;      ///< of the next one
+};
+
 /// The environments that no team works on.
 struct WaitingEnvironments {
-  int* steps;       ///< where each of them stands; -1: a team works on it, or it is at its end
-  int* work;        ///< that each took since `begin`, in solves
-  int* unfinished;  ///< how many are not at their end
+  int* steps;                ///< where each of them stands; -1: a team works on it, or it is at its end
+  int* work;                 ///< that each took since its `begins`, in solves
+  int* unfinished;           ///< how many are not at their end
+  const int *begins, *ends;  ///< steps of each
   int count;
-  int begin, end;   ///< steps
   int leave_at;     ///< so many unfinished ones teams leave to others
   const int* stop;  ///< of the host: once set no team takes another environment
 };
 
+/// Steps after which a team gives an environment back and takes the one with the most work left.
+inline constexpr int turn_steps = 10;
+
 struct ReplayNumbers {
   FrontTables fronts;
-  SheetTables sheet;
+  SheetTables sheet;          ///< of the environment at hand
+  const SheetTables* sheets;  ///< of each environment, with the bending of its material
   const TeamMemory* teams;
+  SolverState* solvers;  ///< of each environment
+  __half* factors;       ///< `factor_numbers` an environment
+  long factor_numbers;
   WaitingEnvironments waiting;
   int places_on_chip;                    ///< whether there is room
   int gradient_shares_at;                ///< what triangles give to gradients, on chip, -1 without room
@@ -152,10 +168,13 @@ struct ReplayNumbers {
 
   // Settings.
   double time_step, tolerance;
-  int max_iterations, stale_factor_solves, halvings, restart_interval;
-  int stats_begin, stats_each;  ///< the step that comes first in `stats`, and how many an environment has
+  double lost_residual;  ///< above which an environment is lost: it goes no further
+  int max_iterations, stale_factor_solves, halvings;
+  int restart_interval;  ///< steps after which a solver starts anew; 0: never
+  int stats_each;        ///< steps that an environment has in `stats`, the first that of its `begins`
 
   const ReplayMaterial* materials;
+  const int* motions;      ///< of each environment
   const Point* loads;      ///< a force a vertex of each environment [N]; null without
   const int* hold_starts;  ///< of each motion and step, in `holds`
   int motion_steps;        ///< steps of a motion, and one more, in `hold_starts`
@@ -171,10 +190,11 @@ struct ReplayNumbers {
   double exit_speed;  ///< [m/s]
   SheetState states;  ///< of each environment
   ReplayStats* stats;
-  double* hold_forces;  ///< environments x steps x holds x 3, from stats_begin on, zero at first [N]
+  double* hold_forces;  ///< on the sheet: environments x steps x holds x 3, zero at first [N]
   int hold_count;
-  const int* kept_index;  ///< of each step from stats_begin on, -1 where it is not kept
-  int kept_count;
+  double* obstacle_forces;  ///< likewise: environments x steps x most_obstacles_each x 3
+  const int* kept_index;    ///< of each step from kept_begin on, -1 where it is not kept; null for none
+  int kept_begin, kept_count;
   const int* order;  ///< vertex at each place
   double* kept;      ///< environments x kept steps x vertices x 3 [m]
 };

@@ -1,94 +1,73 @@
 #include "sim/cuda/replay_reader.h"
 
 #include <algorithm>
-#include <optional>
-
-#include "sim/cuda/device_arena.h"
-#include "sim/cuda/device_error.h"
-#include "sim/cuda/pinned_array.h"
-#include "sim/cuda/replay_memory.h"
+#include <utility>
 
 namespace flash::sim::cuda {
 
-/// Where numbers of one environment stand on the host.
-struct ReplayReader::Memory {
-  /// Environments of which so many are read sooner than memory is pinned.
-  static constexpr int few = 256;
-
-  const ReplayMemory& replay;
-  std::size_t steps, holds, vertices, kept_steps, obstacles;
-  std::optional<PinnedArray<Point>> pinned;
-  std::vector<Point> pageable;
-  Point* points = nullptr;  ///< positions, velocities and bristles
-  ReplayStats* stats = nullptr;
-  double *forces = nullptr, *kept = nullptr;
-
-  explicit Memory(const ReplayMemory& of)
-      : replay(of),
-        steps(static_cast<std::size_t>(of.numbers.stats_each)),
-        holds(static_cast<std::size_t>(of.numbers.hold_count)),
-        vertices(of.size()),
-        kept_steps(of.settings.kept_steps.size()),
-        obstacles(static_cast<std::size_t>(of.numbers.most_obstacles_each)) {
-    const std::size_t size = lay_out(nullptr) / sizeof(Point) + 1;
-    try {
-      if (of.count > few) pinned.emplace(size);
-    } catch (const OutOfMemory&) {  // what a system lets be pinned is limited; other memory does as well
-    }
-    if (!pinned) pageable.resize(size);
-    lay_out(reinterpret_cast<char*>(pinned ? pinned->data() : pageable.data()));
+char* ReplayReader::room(std::size_t bytes) {
+  constexpr int few = 256;  // environments of which so many are read sooner than memory is pinned
+  if (replay_.count > few) {
+    pinned_.hold(bytes);
+    return pinned_.data();
   }
-
-  /// Returns the bytes that it takes.
-  std::size_t lay_out(char* begin) {
-    DeviceArena arena(begin);
-    points = arena.take<Point>((2 + obstacles) * vertices);
-    stats = arena.take<ReplayStats>(steps);
-    forces = arena.take<double>(3 * steps * holds);
-    kept = arena.take<double>(3 * kept_steps * vertices);
-    return arena.used();
-  }
-};
-
-ReplayReader::ReplayReader(const BatchReplay& replay) {
-  replay.memory_->wait();
-  memory_ = std::make_unique<Memory>(*replay.memory_);
+  if (bytes > pageable_.size()) pageable_.resize(bytes);
+  return pageable_.data();
 }
-ReplayReader::~ReplayReader() = default;
 
-ReplayResult ReplayReader::read(int environment, double* kept) {
-  Memory& m = *memory_;
-  const ReplayMemory& replay = m.replay;
-  use_device(replay.device);
+ReplayState ReplayReader::read_state(int environment) {
+  use_device(replay_.device);
   const auto e = static_cast<std::size_t>(environment);
-  const auto fetch = [e](const auto& array, std::size_t each, auto* to) {
-    if (each > 0)
-      check(cudaMemcpyAsync(to, array.data() + e * each, each * sizeof(*to), cudaMemcpyDeviceToHost,
-                            cudaStreamPerThread));
+  const std::size_t vertices = replay_.size();
+  const int layers = replay_.obstacle_counts[e];
+  const std::size_t all = (2 + static_cast<std::size_t>(layers)) * vertices;
+  Point* points = reinterpret_cast<Point*>(room(all * sizeof(Point)));
+  const auto fetch = [](const Point* from, std::size_t count, Point* to) {
+    if (count > 0)
+      check(cudaMemcpyAsync(to, from, count * sizeof(Point), cudaMemcpyDeviceToHost, cudaStreamPerThread));
   };
-  fetch(replay.stats, m.steps, m.stats);
-  fetch(replay.hold_forces, 3 * m.steps * m.holds, m.forces);
-  fetch(replay.kept, 3 * m.kept_steps * m.vertices, m.kept);
-  fetch(replay.positions, m.vertices, m.points);
-  fetch(replay.velocities, m.vertices, m.points + m.vertices);
-  fetch(replay.bristles, m.obstacles * m.vertices, m.points + 2 * m.vertices);
+  fetch(replay_.positions.data() + e * vertices, vertices, points);
+  fetch(replay_.velocities.data() + e * vertices, vertices, points + vertices);
+  fetch(replay_.bristles.data() + e * static_cast<std::size_t>(replay_.most_obstacles_each) * vertices,
+        static_cast<std::size_t>(layers) * vertices, points + 2 * vertices);
   check(cudaStreamSynchronize(cudaStreamPerThread));
 
-  ReplayResult result;
-  result.stats = steps_of({m.stats, m.steps});
-  result.hold_forces.assign(m.forces, m.forces + 3 * m.steps * m.holds);
-  std::copy(m.kept, m.kept + 3 * m.kept_steps * m.vertices, kept);
-  const auto size = static_cast<Eigen::Index>(m.vertices);
-  result.positions.resize(size, 3);
-  result.velocities.resize(size, 3);
-  result.bristles.resize(replay.obstacle_counts[e] * size, 3);
-  const std::vector<int>& order = replay.layout.order;
-  put_points(m.points, order, result.positions);
-  put_points(m.points + m.vertices, order, result.velocities);
-  for (int k = 0; k < replay.obstacle_counts[e]; ++k)
-    put_points(m.points + (2 + static_cast<std::size_t>(k)) * m.vertices, order,
-               result.bristles.middleRows(k * size, size));
-  return result;
+  const auto size = static_cast<Eigen::Index>(vertices);
+  ReplayState state{data::Points(size, 3), data::Points(size, 3), data::Points(layers * size, 3)};
+  const std::vector<int>& order = replay_.layout.order;
+  put_points(points, order, state.positions);
+  put_points(points + vertices, order, state.velocities);
+  for (int k = 0; k < layers; ++k)
+    put_points(points + (2 + static_cast<std::size_t>(k)) * vertices, order,
+               state.bristles.middleRows(k * size, size));
+  return state;
+}
+
+void ReplayReader::read_kept(int environment, int first, int count, double* to) {
+  if (count == 0) return;
+  use_device(replay_.device);
+  const std::size_t numbers = static_cast<std::size_t>(count) * 3 * replay_.size();
+  double* kept = reinterpret_cast<double*>(room(numbers * sizeof(double)));
+  copy_to_end(kept, replay_.tables.kept(environment, first), numbers * sizeof(double),
+              cudaMemcpyDeviceToHost);
+  std::copy(kept, kept + numbers, to);
+}
+
+std::unique_ptr<ReplayReader> IdleReaders::take() {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!idle_.empty()) {
+      auto reader = std::move(idle_.back());
+      idle_.pop_back();
+      return reader;
+    }
+  }
+  return std::make_unique<ReplayReader>(replay_);
+}
+
+void IdleReaders::give_back(std::unique_ptr<ReplayReader> reader) {
+  const std::scoped_lock lock(mutex_);
+  idle_.push_back(std::move(reader));
 }
 
 }  // namespace flash::sim::cuda

@@ -1,31 +1,50 @@
 #pragma once
 #include <memory>
+#include <mutex>
 #include <vector>
 
-#include "sim/cuda/batch_replay.h"
+#include "sim/cuda/replay_memory.h"
 
 namespace flash::sim::cuda {
 
-/// All that a replay has of one environment but for its kept steps, each as BatchReplay has it.
-struct ReplayResult {
-  std::vector<ReplayStep> stats;
-  std::vector<double> hold_forces;
-  data::Points positions, velocities, bristles;
+/// Where an environment is.
+struct ReplayState {
+  data::Points positions, velocities, bristles;  ///< as in State
 };
 
 /// Reads the environments of a replay that has ended, which outlives it. Many threads read best with a reader
 /// each: it has memory that the device writes to by itself, and waits once an environment.
 class ReplayReader {
  public:
-  explicit ReplayReader(const BatchReplay& replay);
-  ~ReplayReader();
+  explicit ReplayReader(const BatchReplay& replay) : ReplayReader(replay.memory()) {}
+  explicit ReplayReader(const ReplayMemory& replay) : replay_(replay) {}
 
-  /// `kept`: where positions go, kept steps x vertices x 3 [m].
-  ReplayResult read(int environment, double* kept);
+  ReplayState read_state(int environment);
+
+  /// `count` kept steps from the `first` on, each vertices x 3, to `to` [m].
+  void read_kept(int environment, int first, int count, double* to);
 
  private:
-  struct Memory;
-  std::unique_ptr<Memory> memory_;
+  char* room(std::size_t bytes);
+
+  const ReplayMemory& replay_;
+  HostMemory pinned_;
+  std::vector<char> pageable_;
+};
+
+/// Readers of a replay that no thread uses at the moment.
+class IdleReaders {
+ public:
+  explicit IdleReaders(const BatchReplay& replay) : IdleReaders(replay.memory()) {}
+  explicit IdleReaders(const ReplayMemory& replay) : replay_(replay) {}
+
+  std::unique_ptr<ReplayReader> take();
+  void give_back(std::unique_ptr<ReplayReader> reader);
+
+ private:
+  const ReplayMemory& replay_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<ReplayReader>> idle_;
 };
 
 }  // namespace flash::sim::cuda

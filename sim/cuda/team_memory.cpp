@@ -7,7 +7,7 @@ namespace flash::sim::cuda {
 TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   const auto number = [](long count) { return static_cast<std::size_t>(count); };
   const std::size_t size = number(sizes.layout.size), triangles = number(sizes.layout.triangle_count),
-                    hinges = number(sizes.layout.hinge_count), held = number(sizes.most_held);
+                    hinges = number(sizes.hinges);
   TeamMemory m{};
   for (int k = 0; k < 3; ++k) {
     m.positions[k] = arena.take<Point>(size);
@@ -21,20 +21,17 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   m.updates = arena.take<float>(number(sizes.fronts.update_size));
   m.block_rows = arena.take<float>(number(sizes.layout.slice_starts.back()) * slice_numbers);
   m.blocks = arena.take<float>(9 * number(sizes.layout.block_count));
-  m.factor = arena.take<__half>(solve_tile_numbers * number(sizes.fronts.factor_tiles));
   m.triangle_gradients = arena.take<double>(9 * triangles);
   m.hinge_gradients = arena.take<double>(12 * hinges);
   m.hinge_matrix = arena.take<float>(12 * hinges);
   m.hinge_products = arena.take<float>(hinges);
-  if (sizes.damped) {
-    m.start_metrics = arena.take<double>(3 * triangles);
-    m.start_angles = arena.take<double>(hinges);
-    m.bent = arena.take<Point>(size);
-    m.damped = arena.take<double>(3 * size);
-  }
+  m.start_metrics = arena.take<double>(3 * triangles);
+  m.start_angles = arena.take<double>(hinges);
+  m.bent = arena.take<Point>(size);
+  m.damped = arena.take<double>(3 * size);
   for (double*& residual : m.residuals) residual = arena.take<double>(3 * size);
   m.held_axes = arena.take<int>(size);
-  m.restrictions = arena.take<VertexRestriction>(sizes.most_obstacles > 0 ? size : held);
+  m.restrictions = arena.take<VertexRestriction>(size);
   m.restriction_of = arena.take<int>(size);
   if (const std::size_t obstacles = number(sizes.most_obstacles); obstacles > 0) {
     const auto records = [&]<typename Record>(std::size_t layers) -> VertexRecords<Record> {
@@ -48,8 +45,8 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
     m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),
                  arena.take<float>(3 * size * most_directions), arena.take<double>(small_numbers)};
   }
-  if (sizes.most_obstacles > 0 || sizes.sprung) m.own_blocks = arena.take<float>(9 * size);
-  m.hold_starts = arena.take<double>(3 * held);
+  m.own_blocks = arena.take<float>(9 * size);
+  m.hold_starts = arena.take<double>(3 * size);
   m.clocks = arena.take<long long>(replay_phases + 1);
   return m;
 }

@@ -5,12 +5,12 @@
 
 namespace flash::sim::cuda {
 
-/// What a team of a replay needs memory for.
+/// What a team of a replay needs memory for, with whatever holds and materials come.
 struct TeamSizes {
   const FrontTables& fronts;
   const SheetLayout& layout;
-  bool damped, sprung;
-  int most_held, most_obstacles;
+  int hinges;  ///< of the plan: a material may come that has them
+  int most_obstacles;
 };
 
 /// The memory of a team as parts of a piece that the arena hands out.

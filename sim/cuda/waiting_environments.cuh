@@ -9,8 +9,9 @@ namespace flash::sim::cuda {
 __device__ inline float remaining_work(const WaitingEnvironments& waiting, int environment, int at) {
   constexpr float usual_steps = 10, usual_work = 27;
   const float done = static_cast<float>(static_cast<const volatile int*>(waiting.work)[environment]);
-  return (done + usual_steps * usual_work) / (static_cast<float>(at - waiting.begin) + usual_steps) *
-         static_cast<float>(waiting.end - at);
+  return (done + usual_steps * usual_work) /
+         (static_cast<float>(at - waiting.begins[environment]) + usual_steps) *
+         static_cast<float>(waiting.ends[environment] - at);
 }
 
 /// The environment with the most work left of those that wait, -1 where none does, where those that are left
@@ -68,7 +69,7 @@ __device__ inline int take(const WaitingEnvironments& waiting, int* step) {
 __device__ inline void give_back(const WaitingEnvironments& waiting, int environment, int step, int work) {
   waiting.work[environment] += work;
   __threadfence();
-  if (step < waiting.end)
+  if (step < waiting.ends[environment])
     atomicExch(waiting.steps + environment, step);
   else
     atomicSub(waiting.unfinished, 1);

@@ -242,8 +242,6 @@ def check_values(options, folder):
 
 def check_device(options, folder):
     """--device cuda of verbs that no device does, and without one of those that it does."""
-    yield from refused(options, folder, [options.sim, "run", "short.json", "-o", "out", "--device", "cuda"],
-                       '--device: found "cuda"', "auto or cpu", "on the CPU alone")
     for words in ([options.sysid, "synth", "--asset", "cloth.json", "--kind", "hang"],
                   [options.sysid, "plan", "recording", "--asset", "asset.json"]):
         for device in ("cuda", "cuda:0", "gpu"):
@@ -251,8 +249,9 @@ def check_device(options, folder):
                                "auto or cpu", "on the CPU alone")
     # Without a device, whatever the machine has.
     hidden = dict(os.environ, CUDA_VISIBLE_DEVICES="")
-    yield from refused(options, folder, [options.sim, "bench", "--device", "cuda"], "--device cuda", "CUDA",
-                       "use --device cpu or auto", env=hidden)
+    for words in (["bench"], ["run", "short.json", "-o", "out"]):
+        yield from refused(options, folder, [options.sim, *words, "--device", "cuda"], "--device cuda", "CUDA",
+                           "use --device cpu or auto", env=hidden)
 
 
 def check_names(options, folder):

@@ -1,5 +1,6 @@
 // Batches on the device beside those on the processor.
-#include "sim/device_batch.h"
+#include "sim/batch.h"
+#include "sim/device_limits.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,9 @@
 #include <mutex>
 #include <numeric>
 
-#include "sim/device_batch.h"
+#include "sim/batch.h"
 #include "sim/device_error.h"
+#include "sim/worlds.h"
 #include "tests/sim/cuda/device_faults.h"
 #include "tests/sim/sheet_scene.h"
 
@@ -48,37 +49,39 @@ BatchSettings settings_on(Device device) {
   return settings;
 }
 
-/// What a device makes of environments: their states, the numbers of those that have finished, and how many
-/// times it had work.
+/// What a device makes of environments: their states and the numbers of those that have finished.
 struct Taken {
-  std::vector<Environment> environments;
+  std::vector<State> states;
   std::vector<std::size_t> finished, without_result;
-  int waves = 0;
   std::string error;
 };
 
-Taken take(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment> environments) {
-  Taken taken{std::move(environments), {}, {}, 0, {}};
+Taken take(const std::shared_ptr<const SheetPlan>& plan, const std::vector<Environment>& environments) {
+  Taken taken;
   std::mutex mutex;
-  DeviceResults results;
-  results.stepped = [](const DeviceSteps&) {};
-  results.kept_at = [](int, int) -> double* { return nullptr; };
-  results.timed = [&](std::span<const double>) {
-    const std::scoped_lock lock(mutex);
-    ++taken.waves;
-  };
-  results.finished = [&](int e) {
-    const std::scoped_lock lock(mutex);
-    taken.finished.push_back(static_cast<std::size_t>(e));
-  };
+  Batch batch(plan, environments, settings_on(Device::cuda));
   try {
-    advance_on_device(plan, taken.environments, settings_on(Device::cuda), 0, steps, results);
+    batch.advance(steps, [&](int e) {
+      const std::scoped_lock lock(mutex);
+      taken.finished.push_back(static_cast<std::size_t>(e));
+    });
   } catch (const DeviceError& error) {
     taken.error = error.what();
     taken.without_result = error.without_result();
   }
+  for (int e = 0; e < batch.size(); ++e) taken.states.push_back(batch.state(e));
   std::sort(taken.finished.begin(), taken.finished.end());
   return taken;
+}
+
+/// Whether all have room on the device at once.
+bool fit(const std::shared_ptr<const SheetPlan>& plan, const std::vector<Environment>& environments) {
+  try {
+    const Worlds worlds(plan, environments, {.device = Device::cuda, .steps_at_once = steps});
+    return true;
+  } catch (const OutOfDeviceMemory&) {
+    return false;
+  }
 }
 
 class DivergesOn : public testing::TestWithParam<Device> {
@@ -116,20 +119,22 @@ TEST(DeviceMemory, ThatDoesNotSufficeMakesWavesAndAtLastNamesTheEnvironments) {
   const std::vector<Environment> environments = slides(*plan, count);
   const Taken whole = take(plan, environments);
   ASSERT_EQ(whole.error, "");
-  EXPECT_EQ(whole.waves, 1);
+  EXPECT_TRUE(fit(plan, environments));
   bool in_waves = false, in_vain = false;
   for (std::size_t left = std::size_t{1} << 28; left >= std::size_t{1} << 16 && !in_vain; left /= 2) {
     SCOPED_TRACE(testing::Message() << left / 1024 << " KB left");
+    bool at_once = false;
     const Taken taken = [&] {
       const cuda::FullDevice full(left);
+      at_once = fit(plan, environments);
       return take(plan, environments);
     }();
-    in_waves = in_waves || (taken.error.empty() && taken.waves > 1);
+    in_waves = in_waves || (taken.error.empty() && !at_once);
     in_vain = !taken.error.empty();
     EXPECT_EQ(taken.finished.size() + taken.without_result.size(), static_cast<std::size_t>(count));
     for (const std::size_t e : taken.finished) {
-      EXPECT_EQ(taken.environments[e].state.positions, whole.environments[e].state.positions);
-      EXPECT_EQ(taken.environments[e].state.velocities, whole.environments[e].state.velocities);
+      EXPECT_EQ(taken.states[e].positions, whole.states[e].positions);
+      EXPECT_EQ(taken.states[e].velocities, whole.states[e].velocities);
     }
     if (!in_vain) continue;
     EXPECT_EQ(taken.error, "CUDA device 0: out of memory; no result of environments 0 to 95");

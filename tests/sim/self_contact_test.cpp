@@ -7,7 +7,7 @@
 
 #include "data/error.h"
 #include "sim/batch.h"
-#include "sim/device_batch.h"
+#include "sim/device_limits.h"
 #include "sim/law/layer_law.h"
 #include "sim/pairs/intersection.h"
 #include "tests/sim/layer_scenes.h"

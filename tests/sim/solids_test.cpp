@@ -6,7 +6,7 @@
 
 #include "data/error.h"
 #include "sim/batch.h"
-#include "sim/device_batch.h"
+#include "sim/device_limits.h"
 #include "tests/sim/solid_scene.h"
 
 namespace flash::sim {

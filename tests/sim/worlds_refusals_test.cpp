@@ -160,7 +160,10 @@ TEST(Worlds, TheConstructorNamesTheEnvironmentThatDoesNotFit) {
   environments[1] = on_a_table(sheet);
   environments[1].materials[0].yield_curvature = 3;
   EXPECT_NE(what_of(environments, {}).find("environment 1: "), std::string::npos);
-  EXPECT_NE(what_of({on_a_table(sheet)}, {.device = Device::cuda}).find("found cuda"), std::string::npos);
+  environments[1] = on_a_table(sheet);
+  environments[2].self_contact = SelfContact{};
+  EXPECT_NE(what_of(environments, {.device = Device::cuda}).find("environment 2: self-contact"),
+            std::string::npos);
 }
 
 }  // namespace

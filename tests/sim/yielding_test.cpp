@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "data/error.h"
-#include "sim/device_batch.h"
+#include "sim/device_limits.h"
 #include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {

@@ -197,12 +197,19 @@ void add_hinges(const SheetPlan& plan, const std::vector<int>& position, SheetLa
 
 }  // namespace
 
-SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts) {
+SheetLayout lay_out_bending(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts) {
   SheetLayout layout;
   layout.size = plan.pattern.size;
+  layout.block_count = layout.size + static_cast<int>(plan.pattern.pairs.size());
+  add_scalar_rows(bending, fronts.position, layout);
+  if (bending.model == data::BendingModel::hinge) add_hinges(plan, fronts.position, layout);
+  return layout;
+}
+
+SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts) {
+  SheetLayout layout = lay_out_bending(plan, bending, fronts);
   layout.order.resize(layout.size);
   layout.vertex_area.resize(layout.size);
-  layout.block_count = layout.size + static_cast<int>(plan.pattern.pairs.size());
   for (int vertex = 0; vertex < layout.size; ++vertex) {
     layout.order[fronts.position[vertex]] = vertex;
     layout.vertex_area[fronts.position[vertex]] = plan.sheet.vertex_area[vertex];
@@ -218,8 +225,6 @@ SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const
     layout.edge_lengths.push_back((plan.sheet.rest.vertices.row(i) - plan.sheet.rest.vertices.row(j)).norm());
   }
   add_block_rows(plan, fronts.position, layout);
-  add_scalar_rows(bending, fronts.position, layout);
-  if (bending.model == data::BendingModel::hinge) add_hinges(plan, fronts.position, layout);
   return layout;
 }
 

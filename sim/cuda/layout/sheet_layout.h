@@ -52,4 +52,7 @@ struct SheetLayout {
 
 SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts);
 
+/// What depends on the bending operator: scalar rows and hinges. The rest is empty.
+SheetLayout lay_out_bending(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts);
+
 }  // namespace flash::sim::cuda

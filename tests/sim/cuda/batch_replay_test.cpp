@@ -410,7 +410,6 @@ TEST(BatchReplay, WhatDoesNotFitIsRefused) {
                  std::invalid_argument);
   };
   refused([](ReplayEnvironment& e) { e.positions.conservativeResize(3, 3); });
-  refused([](ReplayEnvironment& e) { e.material.poissons_ratio = 0.1; });
   refused([](ReplayEnvironment& e) { e.holds = std::make_shared<HoldMotion>(2); });
   refused([](ReplayEnvironment& e) {
     const HeldVertex held{1, {true, true, true}, Vector3d::Zero()};
