@@ -1,0 +1,45 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "data/camera.h"
+#include "data/mesh.h"
+#include "sim/render/triangle_pixels.h"
+
+namespace flash::sim {
+
+/// A triangle mesh that cameras see, with both sides, in one or many environments.
+struct SeenMesh {
+  const data::Triangles* triangles = nullptr;
+  const double* vertices = nullptr;  ///< of environment 0: x y z of each [m]
+  std::ptrdiff_t vertex_count = 0;
+  std::ptrdiff_t stride = 0;                            ///< numbers from one environment to the next
+  std::span<const Eigen::Isometry3d> base_from_mesh{};  ///< of each environment; empty: the base frame
+};
+
+/// What each pixel sees, row by row; nothing hides what lies before it. Each pixel is drawn once where two
+/// triangles share an edge. Of two at one depth the first shows. Triangles with a corner that is no number
+/// are not seen. Throws data::InputError for an empty picture, a focal length that is not above 0 and a lens
+/// with distortion: pictures of depth are rectified before they are used.
+std::vector<PixelHit> see(const data::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_camera,
+                          std::span<const SeenMesh> meshes, int environment = 0);
+
+/// Where pictures go, dense, picture after picture; null: not wanted.
+struct DepthPictures {
+  float* depth = nullptr;            ///< height x width each, along the optical axis [m]; 0: nothing
+  float* distance = nullptr;         ///< along the ray [m]; 0: nothing
+  std::uint8_t* instance = nullptr;  ///< number of the mesh; 255: nothing
+  std::int32_t* triangle = nullptr;  ///< of the mesh; -1: nothing
+  float* points = nullptr;           ///< height x width x 3 each, in the base frame [m]; 0 0 0: nothing
+};
+
+/// A picture of each of `environments`, by their numbers, from its camera in `base_from_camera`, one each in
+/// their order. The same bits on any number of threads. Throws as `see` does, and data::InputError for more
+/// than 255 meshes.
+void render(const data::CameraIntrinsics& camera, std::span<const Eigen::Isometry3d> base_from_camera,
+            std::span<const SeenMesh> meshes, std::span<const int> environments,
+            const DepthPictures& pictures, int threads);
+
+}  // namespace flash::sim
