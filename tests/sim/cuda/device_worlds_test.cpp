@@ -76,8 +76,8 @@ TEST(DeviceWorlds, SingleStepsAreThoseOfOneCallBitForBit) {
   }
 }
 
-// What a step leaves unsolved accelerates by at most the tolerance times g, over t by half of that times t^2.
-// Two solutions miss by that in opposite ways.
+// What a step leaves unsolved accelerates vertices by at most the tolerance times g, in the root mean square;
+// over t by half of that times t^2. Two solutions miss by that in opposite ways. Elasticity is left out.
 TEST(DeviceWorlds, AreThoseOfTheProcessorToTheTolerance) {
   SKIP_WITHOUT_DEVICE();
   const Sheet sheet = small_sheet();
