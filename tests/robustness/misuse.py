@@ -294,7 +294,7 @@ def check_help(options, folder):
         text = program.must(*words, "--help").stdout
         for option, value in values.items():
             yield re.search(f"{option} {value}(,| |$)", text, re.MULTILINE), f"{words[1]} --help: not {option} {value}"
-    for words in ([options.sim, "run"], [options.sysid, "synth"], [options.sysid, "plan"]):
+    for words in ([options.sysid, "synth"], [options.sysid, "plan"]):
         text = program.must(*words, "--help").stdout
         yield "--device DEVICE:{auto,cpu}=auto" in text and "cuda" not in text, f"{words[1]} --help: {text}"
 
