@@ -74,8 +74,9 @@ void write(const Pinhole& camera, const Eigen::Isometry3d& base_from_camera,
     const PixelHit& hit = hits[i];
     const std::size_t pixel = picture * hits.size() + i;
     const auto width = static_cast<std::size_t>(camera.width);
-    const Eigen::Vector3d ray((static_cast<double>(i % width) - camera.cx) / camera.fx,
-                              (static_cast<double>(i / width) - camera.cy) / camera.fy, 1);
+    const std::size_t row = i / width, column = i % width;
+    const Eigen::Vector3d ray((static_cast<double>(column) - camera.cx) / camera.fx,
+                              (static_cast<double>(row) - camera.cy) / camera.fy, 1);
     const bool seen = hit.mesh >= 0;
     const double depth = seen ? 1 / hit.inverse_depth : 0;
     if (pictures.depth) pictures.depth[pixel] = static_cast<float>(depth);
