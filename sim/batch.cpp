@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/projective_phases.h"
 #include "sim/device_error.h"

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #ifdef FLASH_HAVE_CUDA
 #include "sim/cuda/devices.h"
 #endif

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/cuda/most_obstacles.h"
 #include "sim/cuda/most_vertices.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 #include "sim/device_error.h"
 
 namespace flash::sim {

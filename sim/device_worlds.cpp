@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 #ifdef FLASH_HAVE_CUDA
 #include "sim/ask_device.h"
 #include "sim/cuda/hold_motion.h"

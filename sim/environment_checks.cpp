@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sim/step/body_law.h"
 
 namespace flash::sim {

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "data/material.h"
+#include "data/asset/material.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 

@@ -5,8 +5,8 @@
 #include <limits>
 #include <numeric>
 
-#include "data/error.h"
-#include "data/worst.h"
+#include "data/files/error.h"
+#include "data/numbers/worst.h"
 #include "sim/scene/material_values.h"
 #include "sim/scene/scene.h"
 #include "sim/scene_worlds.h"

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "data/mesh.h"
-#include "data/scene.h"
+#include "data/mesh/mesh.h"
+#include "data/scene/scene.h"
 #include "sim/worlds.h"
 
 namespace flash::sim {

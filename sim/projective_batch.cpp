@@ -5,8 +5,8 @@
 #include <tuple>
 #include <utility>
 
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 #include "sim/device_limits.h"
 #include "sim/step/springs.h"
 #ifdef FLASH_HAVE_CUDA

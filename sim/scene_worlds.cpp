@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "data/error.h"
-#include "data/memory_limit.h"
-#include "data/parallel.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/machine/memory_limit.h"
+#include "data/machine/parallel.h"
 #include "sim/newton/solver_memory.h"
 #include "sim/step/body_law.h"
 

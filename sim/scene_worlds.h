@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "data/scene.h"
+#include "data/scene/scene.h"
 #include "sim/device.h"
 #include "sim/scene/scene.h"
 #include "sim/scene/variation.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "data/text.h"
+#include "data/files/text.h"
 
 namespace flash::sim {
 

@@ -6,10 +6,10 @@
 #include <type_traits>
 #include <utility>
 
-#include "data/error.h"
-#include "data/parallel.h"
-#include "data/text.h"
-#include "data/trajectory.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/machine/parallel.h"
+#include "data/motion/trajectory.h"
 #include "sim/device_limits.h"
 #include "sim/device_worlds.h"
 #include "sim/environment_checks.h"

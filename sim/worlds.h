@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "data/material.h"
+#include "data/asset/material.h"
 #include "sim/tensor.h"
 #include "sim/world.h"
 

@@ -15,8 +15,8 @@
 #include "calib/solve/linearization.h"
 #include "calib/uncertainty/lone_view.h"
 #include "calib/uncertainty/pixel_fit.h"
-#include "data/error.h"
-#include "data/median.h"
+#include "data/files/error.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

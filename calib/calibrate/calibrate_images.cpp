@@ -7,7 +7,7 @@
 #include "calib/calibrate/plausibility.h"
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/linearization.h"
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::calib {
 namespace {

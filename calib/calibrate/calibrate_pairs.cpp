@@ -6,8 +6,8 @@
 #include <cstdio>
 
 #include "calib/solve/pose_space.h"
-#include "data/chi_square.h"
-#include "data/error.h"
+#include "data/files/error.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/error.h"
-#include "data/json_reader.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
 
 namespace flash::calib {
 

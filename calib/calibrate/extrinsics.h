@@ -6,7 +6,7 @@
 #include "calib/calibrate/calibrate.h"
 #include "calib/dataset/depth_use.h"
 #include "calib/solve/time_offset.h"
-#include "data/extrinsics.h"
+#include "data/camera/extrinsics.h"
 
 namespace flash::calib {
 

@@ -5,8 +5,8 @@
 #include <cstdio>
 
 #include "calib/uncertainty/motion_in_time.h"
-#include "data/chi_square.h"
-#include "data/median.h"
+#include "data/numbers/chi_square.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

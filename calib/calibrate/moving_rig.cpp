@@ -6,7 +6,7 @@
 
 #include "calib/uncertainty/end_knock.h"
 #include "calib/uncertainty/motion_in_time.h"
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::calib {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::calib {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "data/median.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "calib/detect/board_depth.h"
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::calib {
 namespace {

@@ -7,9 +7,9 @@
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target.h"
 #include "calib/detect/grey_image.h"
-#include "data/camera.h"
-#include "data/depth_map.h"
-#include "data/picture.h"
+#include "data/camera/camera.h"
+#include "data/camera/depth_map.h"
+#include "data/picture/picture.h"
 
 namespace flash::calib {
 

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "calib/geometry/pose.h"
-#include "data/median.h"
-#include "data/text.h"
+#include "data/files/text.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

@@ -7,7 +7,7 @@
 #include "calib/dataset/target.h"
 #include "calib/dataset/target_shape.h"
 #include "calib/geometry/closed_form.h"
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

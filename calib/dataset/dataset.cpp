@@ -7,16 +7,16 @@
 
 #include "calib/dataset/joint_list.h"
 #include "calib/dataset/urdf_file.h"
-#include "data/bare_poses.h"
-#include "data/depth_map.h"
-#include "data/error.h"
-#include "data/frame_files.h"
-#include "data/intrinsics_file.h"
-#include "data/json_reader.h"
-#include "data/pose_file.h"
-#include "data/pose_numbers.h"
-#include "data/rotation_angles.h"
-#include "data/text.h"
+#include "data/camera/depth_map.h"
+#include "data/camera/intrinsics_file.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/text.h"
+#include "data/motion/bare_poses.h"
+#include "data/motion/pose_file.h"
+#include "data/motion/pose_numbers.h"
+#include "data/motion/rotation_angles.h"
+#include "data/recording/frame_files.h"
 
 namespace flash::calib {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "calib/dataset/lens_file.h"
 #include "calib/dataset/observation.h"
-#include "data/camera.h"
-#include "data/trajectory.h"
+#include "data/camera/camera.h"
+#include "data/motion/trajectory.h"
 
 namespace flash::calib {
 

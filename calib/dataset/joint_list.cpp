@@ -3,9 +3,9 @@
 #include <cmath>
 #include <vector>
 
-#include "data/error.h"
-#include "data/pose_table.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/motion/pose_table.h"
 
 namespace flash::calib {
 namespace {

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "calib/geometry/serial_chain.h"
-#include "data/pose_file.h"
+#include "data/motion/pose_file.h"
 
 namespace flash::calib {
 

@@ -1,7 +1,7 @@
 #include "calib/dataset/kalibr.h"
 
-#include "data/error.h"
-#include "data/yaml_file.h"
+#include "data/files/error.h"
+#include "data/files/yaml_file.h"
 
 namespace flash::calib {
 

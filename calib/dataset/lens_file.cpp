@@ -3,10 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/text.h"
-#include "data/yaml_file.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/files/yaml_file.h"
 
 namespace flash::calib {
 

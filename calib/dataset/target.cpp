@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "calib/dataset/kalibr.h"
-#include "data/error.h"
-#include "data/json_reader.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/text.h"
 
 namespace flash::calib {
 namespace {

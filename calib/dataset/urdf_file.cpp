@@ -7,9 +7,9 @@
 #include <map>
 #include <set>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::calib {
 namespace {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "data/error.h"
-#include "data/median.h"
+#include "data/files/error.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "calib/dataset/observation.h"
-#include "data/camera.h"
-#include "data/depth_map.h"
+#include "data/camera/camera.h"
+#include "data/camera/depth_map.h"
 
 namespace flash::calib {
 

@@ -9,10 +9,10 @@
 #include "calib/detect/find_in_all.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/planar_pose.h"
-#include "data/error.h"
-#include "data/median.h"
-#include "data/parallel.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/machine/parallel.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "calib/detect/finder.h"
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

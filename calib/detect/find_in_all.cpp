@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "calib/detect/detection_cache.h"
-#include "data/error.h"
-#include "data/parallel.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/machine/parallel.h"
 
 namespace flash::calib {
 namespace {

@@ -5,10 +5,10 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "calib/detect/cut_off_picture.h"
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/png_reader.h"
-#include "data/text.h"
+#include "data/camera/png_reader.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::calib {
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string>
 
-#include "data/depth_image.h"
+#include "data/camera/depth_image.h"
 
 namespace flash::calib {
 

@@ -9,9 +9,9 @@
 #include "calib/dataset/target_shape.h"
 #include "calib/detect/lens_fit.h"
 #include "calib/geometry/pose.h"
-#include "data/error.h"
-#include "data/median.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

@@ -9,7 +9,7 @@
 #include "calib/dataset/target.h"
 #include "calib/dataset/target_shape.h"
 #include "calib/geometry/projection.h"
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

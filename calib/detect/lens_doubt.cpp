@@ -4,8 +4,8 @@
 #include <cstdio>
 
 #include "calib/detect/plane_residual.h"
-#include "data/median.h"
-#include "data/posed_lens.h"
+#include "data/camera/posed_lens.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

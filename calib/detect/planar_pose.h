@@ -2,7 +2,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "calib/detect/board_depth.h"
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::calib {
 namespace {

@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

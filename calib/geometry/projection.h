@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

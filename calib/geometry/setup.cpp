@@ -1,6 +1,6 @@
 #include "calib/geometry/setup.h"
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::calib {
 

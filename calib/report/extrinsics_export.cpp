@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
 
 namespace flash::calib {
 namespace {

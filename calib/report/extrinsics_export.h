@@ -3,7 +3,7 @@
 #include <string>
 
 #include "calib/geometry/setup.h"
-#include "data/extrinsics.h"
+#include "data/camera/extrinsics.h"
 
 namespace flash::calib {
 

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/uncertainty/joint_zeros.h"
-#include "data/posed_lens.h"
-#include "data/trajectory.h"
+#include "data/camera/posed_lens.h"
+#include "data/motion/trajectory.h"
 
 namespace flash::calib {
 namespace {

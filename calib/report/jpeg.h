@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "data/picture.h"
+#include "data/picture/picture.h"
 
 namespace flash::calib {
 

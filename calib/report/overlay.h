@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 
 #include "calib/detect/grey_image.h"
-#include "data/picture.h"
+#include "data/picture/picture.h"
 
 namespace flash::calib {
 

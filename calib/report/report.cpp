@@ -10,8 +10,8 @@
 #include "calib/geometry/chain.h"
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/jpeg.h"
-#include "data/html_page.h"
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
+#include "data/picture/html_page.h"
 
 namespace flash::embedded {
 std::string_view calibration_report_template();

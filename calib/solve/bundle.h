@@ -11,7 +11,7 @@
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose.h"
 #include "calib/solve/lens_prior.h"
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "calib/geometry/pose.h"
-#include "data/median.h"
-#include "data/rotation_angles.h"
+#include "data/motion/rotation_angles.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

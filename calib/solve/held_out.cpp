@@ -8,7 +8,7 @@
 
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose_from_pixels.h"
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 
 namespace flash::calib {
 namespace {

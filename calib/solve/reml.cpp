@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "data/chi_square.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "calib/geometry/pose.h"
-#include "data/median.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

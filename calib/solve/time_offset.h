@@ -6,7 +6,7 @@
 #include "calib/dataset/observation.h"
 #include "calib/dataset/symmetry.h"
 #include "calib/geometry/pose.h"
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
 
 namespace flash::calib {
 

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "calib/geometry/pose.h"
-#include "data/median.h"
+#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "calib/solve/linearization.h"
 #include "calib/uncertainty/pose_information.h"
-#include "data/chi_square.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "calib/solve/linearization.h"
-#include "data/chi_square.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "calib/solve/linearization.h"
-#include "data/chi_square.h"
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "calib/solve/linearization.h"
-#include "data/chi_square.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "data/meshing/surface_topology.h"
 
 namespace flash::data {

@@ -1,13 +1,13 @@
 #include "data/meshing/fused_frames.h"
 
-#include "data/camera.h"
-#include "data/depth_map.h"
-#include "data/error.h"
-#include "data/extrinsics.h"
-#include "data/frame_files.h"
-#include "data/mesh_io.h"
-#include "data/text.h"
-#include "data/trajectory.h"
+#include "data/camera/camera.h"
+#include "data/camera/depth_map.h"
+#include "data/camera/extrinsics.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/mesh/mesh_io.h"
+#include "data/motion/trajectory.h"
+#include "data/recording/frame_files.h"
 
 namespace flash::data {
 namespace {

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "data/mesh.h"
-#include "data/posed_lens.h"
+#include "data/camera/posed_lens.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::data {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::data {
 

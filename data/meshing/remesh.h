@@ -1,5 +1,5 @@
 #pragma once
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::data {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/error.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "data/meshing/sampled_surface.h"
 #include "data/meshing/triangle_tree.h"
-#include "data/text.h"
 
 namespace flash::data {
 namespace {

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <utility>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::data {
 namespace {

@@ -16,12 +16,12 @@
 #include <utility>
 #include <vector>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/mesh_io.h"
-#include "data/obstacle_mesh.h"
-#include "data/tet_faces.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/obstacle_mesh.h"
+#include "data/mesh/tet_faces.h"
 
 namespace flash::data {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::data {
 

@@ -2,7 +2,7 @@
 
 #include "calib/calibrate/calibrate_pairs.h"
 #include "calib/dataset/dataset.h"
-#include "data/error.h"
+#include "data/files/error.h"
 
 // Where a camera is, from the poses of the robot and of what the camera sees: hand_eye samples.json
 int main(int argc, char** argv) {

@@ -2,7 +2,7 @@
 #include <limits>
 #include <vector>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/worlds.h"
 
 // Four towels of unlike stiffness on a table. A gripper comes down on a corner of each, takes it and lifts

@@ -4,9 +4,9 @@
 #include <exception>
 #include <string>
 
-#include "data/asset.h"
-#include "data/error.h"
-#include "data/scene.h"
+#include "data/asset/asset.h"
+#include "data/files/error.h"
+#include "data/scene/scene.h"
 #include "python/bindings/simulation.h"
 
 namespace flash::python {

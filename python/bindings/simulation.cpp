@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "python/bindings/arrays.h"
 
 namespace flash::python {

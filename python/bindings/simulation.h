@@ -4,7 +4,7 @@
 #include <atomic>
 #include <memory>
 
-#include "data/scene.h"
+#include "data/scene/scene.h"
 #include "sim/live_scene.h"
 
 namespace flash::python {

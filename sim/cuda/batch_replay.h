@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "data/material.h"
-#include "data/mesh.h"
+#include "data/asset/material.h"
+#include "data/mesh/mesh.h"
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/layout/front_plan.h"
 #include "sim/cuda/layout/inverse_layout.h"

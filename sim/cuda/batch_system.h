@@ -2,7 +2,7 @@
 #include <memory>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/layout/front_plan.h"
 #include "sim/plan/sheet_plan.h"

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 #include "sim/cuda/device_arena.h"
 #include "sim/cuda/layout/inverse_factor.h"
 #include "sim/cuda/layout/solve_image.h"

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/law/surface_foot.h"
 
 namespace flash::sim::cuda {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/law/membrane_response.h"
 
 namespace flash::sim {

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "data/material.h"
+#include "data/asset/material.h"
 #include "sim/law/membrane_law.h"
 
 namespace flash::sim {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sim {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "data/obstacle_mesh.h"
+#include "data/mesh/obstacle_mesh.h"
 #include "sim/law/vector3.h"
 
 namespace flash::sim {

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sim/law/feasible_place.h"
 #include "sim/newton/newton_iteration.h"
 #include "sim/pairs/candidate_pairs.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "data/worst.h"
+#include "data/numbers/worst.h"
 #include "sim/law/least_weight.h"
 
 namespace flash::sim {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/worst.h"
+#include "data/numbers/worst.h"
 #include "sim/newton/step_problem.h"
 
 namespace flash::sim {

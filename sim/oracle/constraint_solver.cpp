@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::sim {
 namespace {

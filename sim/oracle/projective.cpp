@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/oracle/anderson.h"
 #include "sim/oracle/projective_contact.h"
 #include "sim/step/feasible_positions.h"

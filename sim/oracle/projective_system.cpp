@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/law/membrane.h"
 #include "sim/plan/isometric_bending.h"
 #include "sim/plan/morley.h"

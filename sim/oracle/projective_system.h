@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "data/material.h"
+#include "data/asset/material.h"
 #include "sim/plan/sheet_plan.h"
 
 namespace flash::sim {

@@ -1,5 +1,5 @@
 #pragma once
-#include "data/box_tree.h"
+#include "data/mesh/box_tree.h"
 
 namespace flash::sim {
 

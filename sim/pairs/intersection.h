@@ -2,7 +2,7 @@
 #include <optional>
 #include <utility>
 
-#include "data/surface_crossing.h"
+#include "data/mesh/surface_crossing.h"
 #include "sim/pairs/pair_surface.h"
 
 namespace flash::sim {

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::sim {
 

@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/law/membrane_law.h"
 #include "sim/scene/sheet.h"
 

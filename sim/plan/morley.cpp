@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/plan/decaying_solution.h"
 
 namespace flash::sim {

@@ -2,8 +2,8 @@
 #include <Eigen/SparseCore>
 #include <vector>
 
-#include "data/material.h"
-#include "data/mesh.h"
+#include "data/asset/material.h"
+#include "data/mesh/mesh.h"
 #include "sim/plan/edge.h"
 #include "sim/scene/sheet.h"
 

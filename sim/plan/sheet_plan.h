@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/material.h"
+#include "data/asset/material.h"
 #include "sim/cpu/instruction_level.h"
 #include "sim/cpu/sheet_product.h"
 #include "sim/cpu/symbolic_factor.h"

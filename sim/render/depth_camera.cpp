@@ -6,8 +6,8 @@
 #include <thread>
 #include <utility>
 
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 
 namespace flash::sim {
 namespace {

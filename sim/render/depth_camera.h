@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "data/camera.h"
-#include "data/mesh.h"
+#include "data/camera/camera.h"
+#include "data/mesh/mesh.h"
 #include "sim/render/triangle_pixels.h"
 
 namespace flash::sim {

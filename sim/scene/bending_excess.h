@@ -1,5 +1,5 @@
 #pragma once
-#include "data/asset.h"
+#include "data/asset/asset.h"
 #include "sim/scene/sheet.h"
 
 namespace flash::sim {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "data/text.h"
+#include "data/files/text.h"
 
 namespace flash::sim {
 

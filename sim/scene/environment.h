@@ -9,9 +9,9 @@
 #include <variant>
 #include <vector>
 
-#include "data/error.h"
-#include "data/material.h"
-#include "data/mesh.h"
+#include "data/asset/material.h"
+#include "data/files/error.h"
+#include "data/mesh/mesh.h"
 #include "sim/scene/hold.h"
 #include "sim/scene/schedule.h"
 

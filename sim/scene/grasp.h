@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sim {
 

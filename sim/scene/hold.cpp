@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sim {
 

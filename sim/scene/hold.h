@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sim {
 

@@ -5,12 +5,12 @@
 #include <map>
 #include <memory>
 
-#include "data/asset.h"
-#include "data/asset_mesh.h"
-#include "data/error.h"
-#include "data/mesh_io.h"
-#include "data/obstacle_mesh.h"
-#include "data/text.h"
+#include "data/asset/asset.h"
+#include "data/asset/asset_mesh.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/obstacle_mesh.h"
 #include "sim/law/surface_mesh.h"
 #include "sim/scene/joined_bodies.h"
 #include "sim/scene/scene_slopes.h"

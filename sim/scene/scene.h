@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "data/scene.h"
+#include "data/scene/scene.h"
 #include "sim/scene/environment.h"
 #include "sim/scene/sheet.h"
 

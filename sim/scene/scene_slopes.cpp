@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <map>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sim/scene/slopes.h"
 
 namespace flash::sim {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
 
 namespace flash::sim {
 

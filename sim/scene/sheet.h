@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sim {
 

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
-#include "data/mesh_io.h"
-#include "data/tet_faces.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/tet_faces.h"
 
 namespace flash::sim {
 

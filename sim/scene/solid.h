@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/scene/sheet.h"
 
 namespace flash::sim {

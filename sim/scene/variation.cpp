@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sim {
 

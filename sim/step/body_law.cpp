@@ -3,8 +3,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/asset.h"
-#include "data/error.h"
+#include "data/asset/asset.h"
+#include "data/files/error.h"
 
 namespace flash::sim {
 

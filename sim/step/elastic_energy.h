@@ -1,5 +1,5 @@
 #pragma once
-#include "data/material.h"
+#include "data/asset/material.h"
 #include "sim/law/membrane.h"
 #include "sim/step/body_law.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sim {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 

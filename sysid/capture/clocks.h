@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
 
 namespace flash::sysid {
 

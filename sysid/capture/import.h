@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "data/mesh.h"
-#include "data/posed_lens.h"
-#include "data/recording.h"
-#include "data/trajectory.h"
+#include "data/camera/posed_lens.h"
+#include "data/mesh/mesh.h"
+#include "data/motion/trajectory.h"
+#include "data/recording/recording.h"
 
 namespace flash::sysid {
 

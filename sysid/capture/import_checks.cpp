@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "data/error.h"
-#include "data/questioned_numbers.h"
-#include "data/text.h"
+#include "data/asset/questioned_numbers.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <map>
 
-#include "data/text.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 namespace {

@@ -4,13 +4,13 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/json_reader.h"
-#include "data/procedural_mesh.h"
-#include "data/staged_folder.h"
-#include "data/text.h"
-#include "data/writable.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/staged_folder.h"
+#include "data/files/text.h"
+#include "data/files/writable.h"
+#include "data/mesh/procedural_mesh.h"
 
 namespace flash::sysid {
 

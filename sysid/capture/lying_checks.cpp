@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "data/text.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 namespace {

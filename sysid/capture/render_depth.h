@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "data/camera.h"
-#include "data/mesh.h"
+#include "data/camera/camera.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sysid {
 

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/atomic_file.h"
-#include "data/json_reader.h"
+#include "data/files/atomic_file.h"
+#include "data/files/json_reader.h"
 
 namespace flash::sysid {
 namespace {

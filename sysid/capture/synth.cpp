@@ -9,13 +9,13 @@
 #include <random>
 #include <utility>
 
-#include "data/asset.h"
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/json_reader.h"
-#include "data/mesh_io.h"
-#include "data/procedural_mesh.h"
-#include "data/text.h"
+#include "data/asset/asset.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/text.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/memory_estimate.h"

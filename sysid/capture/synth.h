@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "data/camera.h"
-#include "data/depth_image.h"
-#include "data/material.h"
-#include "data/mesh.h"
-#include "data/recording.h"
+#include "data/asset/material.h"
+#include "data/camera/camera.h"
+#include "data/camera/depth_image.h"
+#include "data/mesh/mesh.h"
+#include "data/recording/recording.h"
 #include "sim/newton/solver.h"
 #include "sim/scene/environment.h"
 #include "sysid/replay/replay.h"

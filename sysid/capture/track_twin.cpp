@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "data/asset.h"
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/json_reader.h"
+#include "data/asset/asset.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
 
 namespace flash::sysid {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "data/marker_tracks.h"
+#include "data/recording/marker_tracks.h"
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {

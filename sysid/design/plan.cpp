@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sysid/emulate/sensitivity.h"
 #include "sysid/infer/discrepancy_prior.h"
 #include "sysid/infer/expected_information.h"

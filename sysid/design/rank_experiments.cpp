@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/error.h"
-#include "data/procedural_mesh.h"
+#include "data/files/error.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/design/virtual_experiment.h"
 #include "sysid/replay/half_cell.h"
 

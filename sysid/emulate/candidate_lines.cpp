@@ -1,7 +1,7 @@
 #include "sysid/emulate/candidate_lines.h"
 
-#include "data/sha256.h"
-#include "data/text.h"
+#include "data/files/sha256.h"
+#include "data/files/text.h"
 #include "sysid/emulate/results_table.h"
 
 namespace flash::sysid {

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
-#include "data/asset.h"
-#include "data/text.h"
+#include "data/asset/asset.h"
+#include "data/files/text.h"
 
 namespace flash::source_digest {
 

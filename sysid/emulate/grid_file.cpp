@@ -2,10 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/json_reader.h"
-#include "data/sha256.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/sha256.h"
 
 namespace flash::sysid {
 namespace {

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <optional>
 
-#include "data/error.h"
-#include "data/worst.h"
+#include "data/files/error.h"
+#include "data/numbers/worst.h"
 #include "sim/device_error.h"
 #include "sysid/replay/motion_store.h"
 

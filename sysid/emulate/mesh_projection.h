@@ -2,7 +2,7 @@
 #include <Eigen/SparseCholesky>
 #include <memory>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sysid {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 
 namespace flash::sysid {
 namespace {

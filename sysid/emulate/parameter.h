@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "data/material.h"
+#include "data/asset/material.h"
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {

@@ -5,10 +5,10 @@
 #include <limits>
 #include <numeric>
 
-#include "data/asset.h"
-#include "data/error.h"
-#include "data/json_reader.h"
-#include "data/text.h"
+#include "data/asset/asset.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/text.h"
 #include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/recorded_grasp.h"
 

@@ -7,9 +7,9 @@
 #include <limits>
 #include <set>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sysid/emulate/candidate_lines.h"
 #include "sysid/emulate/grid_file.h"
 #include "sysid/emulate/results_table.h"

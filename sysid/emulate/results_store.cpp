@@ -13,9 +13,9 @@
 #include <string_view>
 #include <system_error>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sysid/emulate/candidate_lines.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/results_reader.h"

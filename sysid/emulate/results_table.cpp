@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/atomic_file.h"
+#include "data/files/atomic_file.h"
 
 namespace flash::sysid {
 namespace {

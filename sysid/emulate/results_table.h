@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "data/text.h"
+#include "data/files/text.h"
 #include "sysid/replay/coarse_cells.h"
 #include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/half_cell.h"

@@ -1,6 +1,6 @@
 #include "sysid/emulate/two_mesh_motions.h"
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 #include "sysid/replay/surface_distance.h"
 
 namespace flash::sysid {

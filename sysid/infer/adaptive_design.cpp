@@ -5,8 +5,8 @@
 #include <cmath>
 #include <mutex>
 
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 #include "sysid/emulate/motion_slice.h"
 
 namespace flash::sysid {

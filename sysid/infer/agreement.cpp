@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/text.h"
+#include "data/files/text.h"
 #include "sysid/infer/posterior.h"
 
 namespace flash::sysid {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/text.h"
+#include "data/files/text.h"
 #include "sysid/emulate/focused_axes.h"
 #include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/estimate_errors.h"

@@ -9,8 +9,8 @@
 #include <numeric>
 #include <utility>
 
-#include "data/chi_square.h"
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
+#include "data/numbers/chi_square.h"
 #include "sysid/infer/discrepancy_prior.h"
 #include "sysid/infer/local_noise.h"
 

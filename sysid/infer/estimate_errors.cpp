@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "data/text.h"
+#include "data/files/text.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/solution_errors.h"
 #include "sysid/infer/verdict.h"

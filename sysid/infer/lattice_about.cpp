@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 #include "sysid/infer/solution_errors.h"
 #include "sysid/observe/motion_distance.h"
 

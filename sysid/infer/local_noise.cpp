@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 
 namespace flash::sysid {
 

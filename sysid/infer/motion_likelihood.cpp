@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 #include "sysid/infer/observed_rows.h"
 
 namespace flash::sysid {

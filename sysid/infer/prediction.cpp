@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/local_noise.h"
 #include "sysid/infer/motion_likelihood.h"

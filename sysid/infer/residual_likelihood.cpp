@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/median.h"
+#include "data/numbers/median.h"
 
 namespace flash::sysid {
 namespace {

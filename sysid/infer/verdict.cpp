@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "data/chi_square.h"
-#include "data/text.h"
+#include "data/files/text.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::sysid {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 
 namespace flash::sysid {
 namespace {

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "data/recording.h"
+#include "data/recording/recording.h"
 
 namespace flash::sysid {
 

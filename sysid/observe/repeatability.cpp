@@ -11,8 +11,8 @@
 #include <unsupported/Eigen/LevenbergMarquardt>
 #include <utility>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "data/recording.h"
+#include "data/recording/recording.h"
 #include "sysid/observe/score.h"
 
 namespace flash::sysid {

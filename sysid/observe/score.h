@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "data/mesh.h"
-#include "data/recording.h"
+#include "data/mesh/mesh.h"
+#include "data/recording/recording.h"
 #include "sim/law/surface_foot.h"
 #include "sysid/replay/motion.h"
 #include "sysid/replay/observation.h"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 
 namespace flash::sysid {
 

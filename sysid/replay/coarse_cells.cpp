@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "data/text.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <set>
 
-#include "data/error.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/mesh/procedural_mesh.h"
 #include "data/meshing/remesh.h"
-#include "data/procedural_mesh.h"
-#include "data/text.h"
 #include "sysid/replay/recorded_grasp.h"
 #include "sysid/replay/recorded_mesh.h"
 

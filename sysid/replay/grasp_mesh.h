@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "data/meshing/graded.h"
-#include "data/recording.h"
+#include "data/recording/recording.h"
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {

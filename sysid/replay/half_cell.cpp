@@ -5,10 +5,10 @@
 #include <set>
 #include <utility>
 
-#include "data/halved_tets.h"
-#include "data/procedural_mesh.h"
-#include "data/tet_faces.h"
-#include "data/text.h"
+#include "data/files/text.h"
+#include "data/mesh/halved_tets.h"
+#include "data/mesh/procedural_mesh.h"
+#include "data/mesh/tet_faces.h"
 #include "sysid/replay/grasp_mesh.h"
 
 namespace flash::sysid {

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sysid/replay/surface_distance.h"
 
 namespace flash::sysid {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sim/newton/solver_memory.h"
 
 namespace flash::sysid {

@@ -1,5 +1,5 @@
 #pragma once
-#include "data/memory_limit.h"
+#include "data/machine/memory_limit.h"
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sysid {
 

@@ -10,10 +10,10 @@
 #include <type_traits>
 #include <utility>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/parallel.h"
-#include "data/sha256.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/sha256.h"
+#include "data/machine/parallel.h"
 #include "sim/device_error.h"
 #include "sim/law/vertex_contact.h"
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sysid/replay/mark.h"
 
 namespace flash::sysid {

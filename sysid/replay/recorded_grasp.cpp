@@ -5,8 +5,8 @@
 #include <limits>
 #include <map>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sim/scene/grasp.h"
 #include "sim/scene/slopes.h"
 #include "sim/scene/solid.h"

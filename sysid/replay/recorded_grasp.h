@@ -1,8 +1,8 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "data/recording.h"
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
+#include "data/recording/recording.h"
 #include "sim/scene/hold.h"
 #include "sysid/replay/replay.h"
 

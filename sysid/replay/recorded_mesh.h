@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "data/recording.h"
+#include "data/recording/recording.h"
 
 namespace flash::sysid {
 

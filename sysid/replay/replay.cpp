@@ -7,10 +7,10 @@
 #include <numeric>
 #include <optional>
 
-#include "data/error.h"
-#include "data/scene.h"
-#include "data/text.h"
-#include "data/worst.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/numbers/worst.h"
+#include "data/scene/scene.h"
 #include "sim/batch.h"
 #include "sim/device_error.h"
 #include "sim/device_limits.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "data/recording.h"
+#include "data/recording/recording.h"
 #include "sim/batch.h"
 #include "sysid/replay/motion.h"
 #include "sysid/replay/observation.h"

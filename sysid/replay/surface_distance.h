@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/cpu/instruction_level.h"
 #include "sysid/replay/surface_tree.h"
 

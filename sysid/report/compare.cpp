@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <set>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sysid/report/residuals_file.h"
 #include "sysid/report/search_folder.h"
 

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "data/asset_mesh.h"
-#include "data/error.h"
-#include "data/json_reader.h"
+#include "data/asset/asset_mesh.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
 #include "sim/scene/sheet.h"
 #include "sim/scene/solid.h"
 #include "sysid/report/next_steps.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "data/asset.h"
+#include "data/asset/asset.h"
 #include "sysid/report/summary.h"
 
 namespace flash::sysid {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::sysid {
 namespace {

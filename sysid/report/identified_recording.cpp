@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "data/text.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 namespace {

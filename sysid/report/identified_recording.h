@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "data/asset.h"
+#include "data/asset/asset.h"
 
 namespace flash::sysid {
 

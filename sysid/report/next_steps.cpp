@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "data/text.h"
+#include "data/files/text.h"
 #include "sysid/emulate/parameter_grid.h"
 #include "sysid/report/parameter_label.h"
 

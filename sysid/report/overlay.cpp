@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/mesh_io.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/mesh/mesh_io.h"
 #include "sysid/observe/registration.h"
 
 namespace flash::sysid {

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sysid/emulate/results_store.h"
 #include "sysid/replay/replay.h"
 

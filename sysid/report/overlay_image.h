@@ -2,8 +2,8 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "data/mesh.h"
-#include "data/picture.h"
+#include "data/mesh/mesh.h"
+#include "data/picture/picture.h"
 #include "sysid/report/overlay.h"
 
 namespace flash::sysid {

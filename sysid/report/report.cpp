@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/html_page.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/picture/html_page.h"
 #include "sysid/observe/registration_parameter.h"
 #include "sysid/report/next_steps.h"
 #include "sysid/report/parameter_label.h"

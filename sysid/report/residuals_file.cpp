@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/sha256.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/sha256.h"
+#include "data/files/text.h"
 #include "sysid/emulate/results_table.h"
 
 namespace flash::sysid {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sysid/emulate/candidate_lines.h"
 
 namespace flash::sysid {

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/procedural_mesh.h"
-#include "data/text.h"
+#include "data/files/text.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/replay/recorded_grasp.h"
 
 namespace flash::sysid {

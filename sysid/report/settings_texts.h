@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "data/asset.h"
+#include "data/asset/asset.h"
 #include "sysid/emulate/grid_search.h"
 #include "sysid/replay/replay.h"
 

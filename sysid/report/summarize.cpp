@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/asset.h"
-#include "data/recording_digest.h"
-#include "data/text.h"
+#include "data/asset/asset.h"
+#include "data/files/text.h"
+#include "data/recording/recording_digest.h"
 #include "sysid/emulate/candidate_lines.h"
 #include "sysid/emulate/search_warnings.h"
 #include "sysid/infer/held.h"

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/json_reader.h"
-#include "data/sha256.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/sha256.h"
+#include "data/files/text.h"
 #include "sysid/report/summary_checks.h"
 
 namespace flash::sysid {

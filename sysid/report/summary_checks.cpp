@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 #include "sysid/emulate/parameter_grid.h"
 #include "sysid/infer/weight_scale.h"
 

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cstdio>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/cuda/batch_system.h"
 #include "sim/cuda/devices.h"
 #include "tests/bench/corner_lift.h"

@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <string>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/cuda/devices.h"
 #include "sim/cuda/layout/inverse_tree.h"
 #include "sim/cuda/projective_phases.h"

@@ -10,8 +10,8 @@
 #include <numeric>
 #include <string>
 
-#include "data/procedural_mesh.h"
-#include "data/trajectory.h"
+#include "data/mesh/procedural_mesh.h"
+#include "data/motion/trajectory.h"
 #include "sim/worlds.h"
 #include "tests/bench/device_bench.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <cmath>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/cpu/block_cholesky.h"
 #include "sim/step/elastic_energy.h"
 

@@ -6,11 +6,11 @@
 #include <functional>
 
 #include "calib/geometry/pose.h"
-#include "data/atomic_file.h"
-#include "data/depth_image.h"
-#include "data/error.h"
-#include "data/picture.h"
-#include "data/trajectory.h"
+#include "data/camera/depth_image.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/motion/trajectory.h"
+#include "data/picture/picture.h"
 #include "tests/calib/rendered_view.h"
 
 namespace flash::calib {

@@ -6,7 +6,7 @@
 #include "calib/dataset/target.h"
 #include "calib/detect/grey_image.h"
 #include "calib/detect/rectifier.h"
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 namespace flash::calib {
 

@@ -1,4 +1,4 @@
-#include "data/asset.h"
+#include "data/asset/asset.h"
 
 #include "tests/fuzz/loader_fuzzer.h"
 

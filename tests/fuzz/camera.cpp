@@ -1,4 +1,4 @@
-#include "data/camera.h"
+#include "data/camera/camera.h"
 
 #include "tests/fuzz/loader_fuzzer.h"
 

@@ -1,4 +1,4 @@
-#include "data/depth_image.h"
+#include "data/camera/depth_image.h"
 
 #include "tests/fuzz/loader_fuzzer.h"
 

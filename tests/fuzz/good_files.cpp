@@ -2,14 +2,14 @@
 
 #include <filesystem>
 
-#include "data/asset.h"
-#include "data/atomic_file.h"
-#include "data/camera.h"
-#include "data/depth_image.h"
-#include "data/mesh_io.h"
-#include "data/procedural_mesh.h"
-#include "data/recording.h"
-#include "data/trajectory.h"
+#include "data/asset/asset.h"
+#include "data/camera/camera.h"
+#include "data/camera/depth_image.h"
+#include "data/files/atomic_file.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/procedural_mesh.h"
+#include "data/motion/trajectory.h"
+#include "data/recording/recording.h"
 
 namespace flash::fuzz {
 namespace {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::fuzz {
 

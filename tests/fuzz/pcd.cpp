@@ -1,4 +1,4 @@
-#include "data/mesh_io.h"
+#include "data/mesh/mesh_io.h"
 
 #include "tests/fuzz/loader_fuzzer.h"
 

@@ -1,4 +1,4 @@
-#include "data/recording.h"
+#include "data/recording/recording.h"
 
 #include "tests/fuzz/good_files.h"
 #include "tests/fuzz/loader_fuzzer.h"

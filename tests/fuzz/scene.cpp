@@ -1,6 +1,6 @@
-#include "data/scene.h"
+#include "data/scene/scene.h"
 
-#include "data/asset.h"
+#include "data/asset/asset.h"
 #include "tests/fuzz/loader_fuzzer.h"
 
 FLASH_FUZZ_LOADER("scene.json", [](const std::string& path) {

@@ -1,4 +1,4 @@
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
 
 #include "tests/fuzz/loader_fuzzer.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {

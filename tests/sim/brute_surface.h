@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 // What a surface of triangles is, asked of all triangles one by one: what fast queries are held against.
 namespace flash::sim {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::sim {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/sim/sheet_scene.h"
 #include "tests/sim/worlds_scene.h"
 

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::sim {
 namespace {

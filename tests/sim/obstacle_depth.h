@@ -1,5 +1,5 @@
 #pragma once
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/law/surface_mesh.h"
 #include "sim/scene/environment.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/batch.h"
 #include "sim/device_limits.h"
 #include "tests/sim/sheet_scene.h"

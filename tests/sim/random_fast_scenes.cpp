@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "tests/sim/brute_passing.h"
 #include "tests/sim/layer_scenes.h"
 #include "tests/sim/lot.h"

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/pairs/intersection.h"
 #include "tests/sim/layer_scenes.h"
 #include "tests/sim/lot.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/scene/solid.h"
 #include "tests/sim/lot.h"
 #include "tests/sim/sheet_scene.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 
 namespace flash::sim {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/batch.h"
 #include "sim/device_limits.h"
 #include "sim/law/layer_law.h"

@@ -5,7 +5,7 @@
 #include <functional>
 #include <limits>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/batch.h"
 #include "sim/oracle/projective.h"
 #include "tests/sim/sheet_scene.h"

@@ -2,7 +2,7 @@
 #include <functional>
 #include <vector>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/newton/solver.h"
 #include "sim/scene/solid.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/batch.h"
 #include "sim/device_limits.h"
 #include "tests/sim/solid_scene.h"

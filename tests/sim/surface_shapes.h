@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "data/obstacle_mesh.h"
-#include "data/procedural_mesh.h"
+#include "data/mesh/obstacle_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/law/surface_mesh.h"
 #include "sim/scene/environment.h"
 

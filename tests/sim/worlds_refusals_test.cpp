@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/worlds.h"
 #include "tests/sim/sheet_scene.h"
 #include "tests/sim/worlds_scene.h"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/trajectory.h"
+#include "data/motion/trajectory.h"
 #include "sim/worlds.h"
 #include "tests/sim/sheet_scene.h"
 

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "data/error.h"
-#include "data/trajectory.h"
+#include "data/files/error.h"
+#include "data/motion/trajectory.h"
 #include "sim/batch.h"
 #include "tests/sim/sheet_scene.h"
 #include "tests/sim/worlds_scene.h"

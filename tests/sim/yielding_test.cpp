@@ -7,7 +7,7 @@
 #include <cstring>
 #include <limits>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/device_limits.h"
 #include "tests/sim/sheet_scene.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 #include "sysid/replay/replay.h"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "calib/calibrate/calibrate_pairs.h"
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {

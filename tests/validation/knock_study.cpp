@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "calib/calibrate/calibrate.h"
-#include "data/error.h"
-#include "data/parallel.h"
+#include "data/files/error.h"
+#include "data/machine/parallel.h"
 #include "tests/calib/arm_scene.h"
 #include "tests/calib/knocked_scene.h"
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/newton/solver.h"
 #include "sim/scene/solid.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 #include "tests/sim/random_fast_scenes.h"
 #include "tests/sim/random_layer_scenes.h"
 #include "tests/sim/scene_findings.h"

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/scene.h"
+#include "data/scene/scene.h"
 #include "sim/batch.h"
 #include "sim/scene/scene.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "calib/calibrate/calibrate.h"
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {

@@ -2,7 +2,7 @@
 #include <array>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/cpu/block_pattern.h"
 
 namespace flash::sim::cuda {

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/cpu/block_pattern.h"
 #include "sim/cuda/layout/front_layout.h"
 

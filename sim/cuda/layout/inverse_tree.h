@@ -2,7 +2,7 @@
 #include <Eigen/SparseCore>
 #include <vector>
 
-#include "data/mesh.h"
+#include "data/mesh/mesh.h"
 #include "sim/cpu/block_pattern.h"
 #include "sim/cuda/layout/inverse_layout.h"
 

@@ -15,8 +15,8 @@
 #include <limits>
 #include <set>
 
-#include "data/error.h"
-#include "data/text.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 namespace {

@@ -6,8 +6,8 @@
 #include <set>
 #include <vector>
 
-#include "data/mesh.h"
-#include "data/recording.h"
+#include "data/mesh/mesh.h"
+#include "data/recording/recording.h"
 
 namespace flash::sysid {
 

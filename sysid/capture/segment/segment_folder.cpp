@@ -10,14 +10,14 @@
 #include <filesystem>
 #include <utility>
 
-#include "data/atomic_file.h"
-#include "data/depth_map.h"
-#include "data/error.h"
-#include "data/extrinsics.h"
-#include "data/frame_files.h"
-#include "data/mesh_io.h"
-#include "data/staged_folder.h"
-#include "data/text.h"
+#include "data/camera/depth_map.h"
+#include "data/camera/extrinsics.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/staged_folder.h"
+#include "data/files/text.h"
+#include "data/mesh/mesh_io.h"
+#include "data/recording/frame_files.h"
 #include "sysid/capture/clocks.h"
 #include "sysid/capture/segment/cell_check.h"
 #include "sysid/capture/segment/segment_picture.h"

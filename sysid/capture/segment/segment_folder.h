@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "data/camera.h"
-#include "data/posed_lens.h"
-#include "data/trajectory.h"
+#include "data/camera/camera.h"
+#include "data/camera/posed_lens.h"
+#include "data/motion/trajectory.h"
 #include "sysid/capture/segment/segment.h"
 
 namespace flash::sysid {

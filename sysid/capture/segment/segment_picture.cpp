@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <utility>
 
-#include "data/html_page.h"
-#include "data/picture.h"
-#include "data/text.h"
+#include "data/files/text.h"
+#include "data/picture/html_page.h"
+#include "data/picture/picture.h"
 
 namespace flash::sysid {
 namespace {

@@ -9,7 +9,7 @@
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/detect/detect.h"
 #include "calib/solve/linearization.h"
-#include "data/depth_image.h"
+#include "data/camera/depth_image.h"
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/calib/rendered_set.h"
 #include "tests/data/temporary_folder.h"

@@ -4,7 +4,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/calib/cell_member.h"
 
 namespace flash::calib {

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "calib/calibrate/calibrate.h"
-#include "data/error.h"
-#include "data/rotation_angles.h"
+#include "data/files/error.h"
+#include "data/motion/rotation_angles.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {

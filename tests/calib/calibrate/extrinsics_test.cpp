@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/report/extrinsics_json.h"
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/json_reader.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/data/temporary_folder.h"
 

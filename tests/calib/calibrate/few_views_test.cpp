@@ -4,7 +4,7 @@
 #include <Eigen/Cholesky>
 
 #include "calib/calibrate/calibrate_pairs.h"
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "calib/calibrate/extrinsics.h"
-#include "data/atomic_file.h"
+#include "data/files/atomic_file.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "data/error.h"
-#include "data/picture.h"
+#include "data/files/error.h"
+#include "data/picture/picture.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {

@@ -5,12 +5,12 @@
 #include <filesystem>
 
 #include "calib/dataset/dataset.h"
-#include "data/error.h"
-#include "data/extrinsics.h"
-#include "data/intrinsics_file.h"
-#include "data/npz.h"
-#include "data/picture.h"
-#include "data/trajectory.h"
+#include "data/camera/extrinsics.h"
+#include "data/camera/intrinsics_file.h"
+#include "data/files/error.h"
+#include "data/files/npz.h"
+#include "data/motion/trajectory.h"
+#include "data/picture/picture.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {

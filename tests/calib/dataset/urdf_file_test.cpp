@@ -4,7 +4,7 @@
 
 #include "calib/dataset/joint_list.h"
 #include "calib/geometry/pose.h"
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {

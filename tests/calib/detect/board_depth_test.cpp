@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {

@@ -8,9 +8,9 @@
 
 #include "calib/detect/finder.h"
 #include "calib/detect/grey_image.h"
-#include "data/atomic_file.h"
-#include "data/depth_image.h"
-#include "data/picture.h"
+#include "data/camera/depth_image.h"
+#include "data/files/atomic_file.h"
+#include "data/picture/picture.h"
 #include "tests/calib/rendered_view.h"
 #include "tests/data/temporary_folder.h"
 

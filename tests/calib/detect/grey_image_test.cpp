@@ -6,8 +6,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "data/atomic_file.h"
-#include "data/depth_image.h"
+#include "data/camera/depth_image.h"
+#include "data/files/atomic_file.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {

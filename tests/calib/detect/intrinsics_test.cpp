@@ -5,7 +5,7 @@
 #include <random>
 
 #include "calib/dataset/target_shape.h"
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/calib/rendered_view.h"
 #include "tests/data/temporary_folder.h"
 

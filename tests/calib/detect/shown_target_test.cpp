@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "calib/detect/detect.h"
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/calib/rendered_set.h"
 #include "tests/data/temporary_folder.h"
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/calibrate/calibrate_pairs.h"
-#include "data/json_reader.h"
+#include "data/files/json_reader.h"
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/data/temporary_folder.h"
 

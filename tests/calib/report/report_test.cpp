@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/report/extrinsics_json.h"
-#include "data/picture.h"
+#include "data/picture/picture.h"
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/data/temporary_folder.h"
 

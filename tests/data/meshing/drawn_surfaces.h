@@ -2,8 +2,8 @@
 #include <cmath>
 #include <random>
 
-#include "data/mesh.h"
-#include "data/procedural_mesh.h"
+#include "data/mesh/mesh.h"
+#include "data/mesh/procedural_mesh.h"
 
 namespace flash::data {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "tests/data/meshing/drawn_surfaces.h"
 
 namespace flash::data {

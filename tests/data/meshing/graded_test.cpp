@@ -6,10 +6,10 @@
 #include <cmath>
 #include <map>
 
-#include "data/mesh_io.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/procedural_mesh.h"
 #include "data/meshing/remesh.h"
 #include "data/meshing/surface_topology.h"
-#include "data/procedural_mesh.h"
 
 namespace flash::data {
 namespace {

@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "data/mesh_io.h"
+#include "data/mesh/mesh_io.h"
 #include "data/meshing/surface_topology.h"
 #include "data/meshing/triangle_tree.h"
 #include "tests/data/meshing/drawn_surfaces.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string>
 
-#include "data/error.h"
-#include "data/mesh_io.h"
+#include "data/files/error.h"
+#include "data/mesh/mesh_io.h"
 #include "data/meshing/flatten.h"
 #include "tests/data/meshing/drawn_surfaces.h"
 

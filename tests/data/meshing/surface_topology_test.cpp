@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "data/meshing/triangle_tree.h"
 #include "tests/data/meshing/drawn_surfaces.h"
 

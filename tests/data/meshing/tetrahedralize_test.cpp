@@ -4,8 +4,8 @@
 
 #include <cstdlib>
 
-#include "data/error.h"
-#include "data/mesh_io.h"
+#include "data/files/error.h"
+#include "data/mesh/mesh_io.h"
 
 namespace flash::data {
 namespace {

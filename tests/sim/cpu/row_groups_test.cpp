@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/plan/morley.h"
 
 namespace flash::sim {

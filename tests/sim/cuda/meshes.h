@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/plan/sheet_plan.h"
 
 namespace flash::sim::cuda {

@@ -11,7 +11,7 @@
 #include <random>
 #include <string>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/cuda/devices.h"
 
 namespace flash::sim::cuda {

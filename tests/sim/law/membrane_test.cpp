@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/law/membrane_stress.h"
 #include "sim/scene/sheet.h"
 #include "tests/sim/reference_scene.h"

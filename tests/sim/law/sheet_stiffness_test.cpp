@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/law/membrane.h"
 
 namespace flash::sim {

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::sim {
 namespace {

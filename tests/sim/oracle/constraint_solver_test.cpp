@@ -5,7 +5,7 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/oracle/constraint_newton.h"
 
 namespace flash::sim {

@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/pairs/intersection.h"
 
 namespace flash::sim {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/plan/morley.h"
 
 namespace flash::sim {

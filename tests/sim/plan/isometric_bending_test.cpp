@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "tests/sim/reference_scene.h"
 
 namespace flash::sim {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "data/error.h"
-#include "data/procedural_mesh.h"
+#include "data/files/error.h"
+#include "data/mesh/procedural_mesh.h"
 
 namespace flash::sim {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "tests/sim/obstacle_depth.h"
 #include "tests/sim/sheet_scene.h"
 

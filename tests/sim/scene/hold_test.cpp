@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sim/oracle/projective.h"
 #include "tests/sim/sheet_scene.h"
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/plan/hinge_bending.h"
 #include "sim/plan/isometric_bending.h"
 

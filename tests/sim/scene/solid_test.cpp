@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "data/error.h"
-#include "data/procedural_mesh.h"
+#include "data/files/error.h"
+#include "data/mesh/procedural_mesh.h"
 #include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/import_picture.h"
 #include "tests/data/temporary_folder.h"
 

@@ -7,13 +7,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "data/atomic_file.h"
-#include "data/depth_image.h"
-#include "data/extrinsics.h"
-#include "data/frame_files.h"
-#include "data/mesh_io.h"
-#include "data/procedural_mesh.h"
-#include "data/text.h"
+#include "data/camera/depth_image.h"
+#include "data/camera/extrinsics.h"
+#include "data/files/atomic_file.h"
+#include "data/files/text.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/procedural_mesh.h"
+#include "data/recording/frame_files.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {

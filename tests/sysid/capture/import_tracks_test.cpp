@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "data/atomic_file.h"
+#include "data/files/atomic_file.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {

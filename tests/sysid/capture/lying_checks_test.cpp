@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 
 namespace flash::sysid {
 namespace {

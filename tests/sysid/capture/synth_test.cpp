@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/grid_search.h"

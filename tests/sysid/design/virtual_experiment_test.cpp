@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "data/atomic_file.h"
+#include "data/files/atomic_file.h"
 #include "sim/device.h"
 #include "sim/device_error.h"
 #include "sysid/emulate/fingerprint.h"

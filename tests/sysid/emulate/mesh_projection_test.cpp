@@ -5,8 +5,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "data/mesh/procedural_mesh.h"
 #include "data/meshing/remesh.h"
-#include "data/procedural_mesh.h"
 #include "sysid/emulate/two_mesh_motions.h"
 
 namespace flash::sysid {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <string_view>
 
-#include "data/atomic_file.h"
-#include "data/text.h"
+#include "data/files/atomic_file.h"
+#include "data/files/text.h"
 #include "sysid/emulate/results_store.h"
 #include "tests/data/temporary_folder.h"
 

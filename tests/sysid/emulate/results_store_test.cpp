@@ -7,8 +7,8 @@
 #include <fstream>
 #include <limits>
 
-#include "data/atomic_file.h"
-#include "data/sha256.h"
+#include "data/files/atomic_file.h"
+#include "data/files/sha256.h"
 #include "sysid/emulate/results_reader.h"
 #include "tests/data/temporary_folder.h"
 

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "data/atomic_file.h"
-#include "data/sha256.h"
+#include "data/files/atomic_file.h"
+#include "data/files/sha256.h"
 #include "sysid/infer/held.h"
 #include "tests/sysid/short_lift.h"
 

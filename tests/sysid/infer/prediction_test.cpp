@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sysid/infer/observed_rows.h"
 #include "tests/sysid/moving_sheet.h"
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <string>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 #include "sysid/emulate/fingerprint.h"

@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-#include "data/parallel.h"
+#include "data/machine/parallel.h"
 #include "sim/device.h"
 #include "sysid/observe/registration.h"
 #include "tests/sysid/moving_sheet.h"

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "data/error.h"
-#include "data/procedural_mesh.h"
+#include "data/files/error.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 #include "tests/data/temporary_folder.h"

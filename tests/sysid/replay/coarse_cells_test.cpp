@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "data/procedural_mesh.h"
+#include "data/mesh/procedural_mesh.h"
 #include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {

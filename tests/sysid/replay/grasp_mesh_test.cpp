@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "data/mesh/procedural_mesh.h"
 #include "data/meshing/remesh.h"
-#include "data/procedural_mesh.h"
 #include "sysid/capture/synth.h"
 #include "sysid/replay/half_cell.h"
 #include "sysid/replay/recorded_grasp.h"

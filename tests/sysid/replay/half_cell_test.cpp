@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "data/mesh/procedural_mesh.h"
 #include "data/meshing/remesh.h"
-#include "data/procedural_mesh.h"
 #include "sysid/observe/score.h"
 #include "tests/sysid/short_lift.h"
 #include "tests/sysid/tracked_beam.h"

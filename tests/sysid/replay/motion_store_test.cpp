@@ -5,9 +5,9 @@
 #include <chrono>
 #include <filesystem>
 
-#include "data/atomic_file.h"
-#include "data/procedural_mesh.h"
-#include "data/sha256.h"
+#include "data/files/atomic_file.h"
+#include "data/files/sha256.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 #include "sysid/emulate/grid_search.h"

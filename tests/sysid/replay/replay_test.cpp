@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "data/atomic_file.h"
-#include "data/error.h"
-#include "data/procedural_mesh.h"
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/mesh/procedural_mesh.h"
 #include "sim/pairs/intersection.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/grid_search.h"

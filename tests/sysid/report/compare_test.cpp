@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "data/atomic_file.h"
+#include "data/files/atomic_file.h"
 #include "sysid/report/residuals_file.h"
 #include "tests/data/temporary_folder.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "data/error.h"
+#include "data/files/error.h"
 #include "sysid/emulate/candidate_lines.h"
 #include "sysid/emulate/results_store.h"
 #include "tests/data/temporary_folder.h"

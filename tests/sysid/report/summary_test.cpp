@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "data/atomic_file.h"
+#include "data/files/atomic_file.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/sysid/summary_fixture.h"
 

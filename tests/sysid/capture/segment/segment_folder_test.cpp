@@ -8,9 +8,9 @@
 #include <functional>
 #include <random>
 
-#include "data/depth_image.h"
-#include "data/error.h"
-#include "data/mesh_io.h"
+#include "data/camera/depth_image.h"
+#include "data/files/error.h"
+#include "data/mesh/mesh_io.h"
 #include "sysid/capture/segmented_cell.h"
 
 namespace flash::sysid {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "data/error.h"
+#include "data/files/error.h"
 
 namespace flash::sysid {
 namespace {

@@ -1,0 +1,54 @@
+#include "apps/command_line/result_files.h"
+
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "data/files/error.h"
+
+namespace flash {
+namespace {
+
+using Identity = std::pair<dev_t, ino_t>;
+
+/// What a file is, by whatever path it is reached; none where nothing is there.
+std::optional<Identity> identity_of(const std::string& path) {
+  struct stat status = {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return Identity(status.st_dev, status.st_ino);
+}
+
+/// Of a file that may not be there yet.
+std::string whole_path(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::path whole =
+      std::filesystem::weakly_canonical(std::filesystem::absolute(path, error), error);
+  return error ? path : whole.string();
+}
+
+}  // namespace
+
+void expect_own_files(const std::vector<std::string>& written, const std::vector<std::string>& read) {
+  std::map<Identity, std::string> inputs;
+  for (const std::string& path : read)
+    if (const std::optional<Identity> identity = identity_of(path)) inputs.emplace(*identity, path);
+  std::map<std::string, std::string> outputs;
+  std::map<Identity, std::string> existing;
+  for (const std::string& path : written) {
+    if (path.empty()) continue;
+    const std::optional<Identity> identity = identity_of(path);
+    if (!outputs.emplace(whole_path(path), path).second ||
+        (identity && !existing.emplace(*identity, path).second))
+      throw data::InputError(path + ": named twice, each result needs a file of its own");
+    const auto input = identity ? inputs.find(*identity) : inputs.end();
+    if (input != inputs.end())
+      throw data::InputError(path + ": is read by this run" +
+                             (input->second == path ? "" : ", as " + input->second) +
+                             "; expected another file for the result");
+  }
+}
+
+}  // namespace flash

@@ -1,0 +1,480 @@
+#include "apps/sysid/options.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <thread>
+
+#include "apps/command_line/command_line.h"
+#include "apps/command_line/option_checks.h"
+#include "data/files/error.h"
+#include "data/files/message_line.h"
+#include "data/files/text.h"
+#include "data/files/writable.h"
+#include "data/mesh/mesh_io.h"
+#include "data/mesh/procedural_mesh.h"
+#include "data/mesh/seams.h"
+#include "data/recording/recording_digest.h"
+#include "sim/scene/sheet.h"
+#include "sysid/emulate/search_warnings.h"
+#include "sysid/report/recording_names.h"
+
+namespace flash {
+namespace {
+
+std::string duration_text(double seconds) {
+  char text[32];
+  if (seconds < 90) {
+    std::snprintf(text, sizeof text, "%.0f s", seconds);
+  } else if (seconds < 5400) {
+    std::snprintf(text, sizeof text, "%.0f min", seconds / 60);
+  } else {
+    std::snprintf(text, sizeof text, "%.1f h", seconds / 3600);
+  }
+  return text;
+}
+
+void set_sigma(const std::string& assignment, sysid::Objective& objective) {
+  const std::size_t equals = assignment.find('=');
+  const std::string name = assignment.substr(0, equals);
+  double* const sigma = name == "cloud"     ? &objective.cloud_sigma
+                        : name == "contour" ? &objective.contour_sigma
+                        : name == "markers" ? &objective.marker_sigma
+                        : name == "force"   ? &objective.force_sigma
+                                            : nullptr;
+  const std::optional<double> value =
+      data::parse_number(equals == std::string::npos ? "" : std::string_view(assignment).substr(equals + 1));
+  if (sigma == nullptr || !value || !(*value > 0) || !std::isfinite(*value))
+    throw data::InputError(
+        "--sigma: \"" + assignment +
+        "\": expected cloud, contour, markers or force = a positive number, as force=0.02");
+  constexpr double kLargest = 0.1;  // [m]
+  if (sigma != &objective.force_sigma && *value >= kLargest)
+    throw data::InputError("--sigma: " + assignment + ": found " + data::format_short(*value) +
+                           " m, expected below 0.1 m; a millimetre is 0.001");
+  *sigma = *value;
+}
+
+/// As though the asset itself held the constants.
+data::Asset with_fixed(data::Asset asset, const std::vector<sysid::Axis>& fixed) {
+  for (const sysid::Axis& axis : fixed) {
+    const double value = axis.values.front();
+    if (axis.name == "young") asset.young = value;
+    if (axis.name == "poisson") asset.poisson = value;
+    if (axis.name == "bending") {
+      asset.bending_rigidity = value;
+      if (asset.published_bending.has_value() && !asset.bending_model)
+        asset.bending_model = data::BendingModel::isometric;
+      asset.published_bending.reset();
+    }
+    if (axis.name == "areal_density" && asset.element_type == data::ElementType::triangle) {
+      asset.areal_density = value;
+      for (std::optional<double>* other : {&asset.density, &asset.mass, &asset.object_mass}) other->reset();
+    }
+    if (axis.name == "density" && asset.element_type == data::ElementType::tetrahedron) {
+      asset.density = value;
+      for (std::optional<double>* other : {&asset.mass, &asset.object_mass}) other->reset();
+    }
+    for (const char* name : {"young", "poisson", "bending", "areal_density", "density"})
+      if (axis.name == name) asset.source += " --hold " + axis.name + "=" + data::format_short(value);
+  }
+  return asset;
+}
+
+}  // namespace
+
+void add_common_options(CLI::App& verb, CommonOptions& options) {
+  CLI::App& group = *verb.add_option_group("Common");
+  group.add_flag("--json", options.json, "Print the result as JSON on stdout");
+  CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
+  group.add_flag("--verbose", options.verbose, "Print every notice")->excludes(quiet);
+  group.add_flag("--force", options.force, "Overwrite what is there");
+  group.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
+      ->check(thread_number())
+      ->capture_default_str();
+}
+
+void add_seed_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--seed", options.seed, "Random seed: the same one gives the same result")
+      ->check(whole_number(0, std::numeric_limits<unsigned>::max()))
+      ->capture_default_str();
+}
+
+void add_device_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--device", options.device,
+                  "Where the simulation runs: cpu, cuda, cuda:1, cuda:0,2, cuda:all, or auto: a CUDA device "
+                  "where there is one")
+      ->capture_default_str();
+}
+
+void add_cpu_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--device", options.device, "Where the simulation runs")
+      ->check(cpu_alone("this verb simulates on the CPU alone"))
+      ->capture_default_str();
+}
+
+void add_grasp_cell_option(CLI::App& verb, std::optional<double>& grasp_cell) {
+  verb.add_option(
+          "--grasp-cell", grasp_cell,
+          "Edge length of the cells at the grasps [m]; without it, a fifth of those of the mesh or of "
+          "the patch, where the mesh names no pattern; 0: the mesh as it is")
+      ->check(number_from(0));
+}
+
+void add_replay_options(CLI::App& verb, ReplayOptions& options) {
+  CLI::App& group = *verb.add_option_group("Replay and score");
+  group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
+  group.add_option("--time-step", options.time_step, "Time step of the simulation [s]")
+      ->check(time_step())
+      ->capture_default_str();
+  group.add_option("--iterations", options.iterations, "Maximum Newton iterations per time step")
+      ->check(whole_number(1, 10000))
+      ->capture_default_str();
+  group
+      .add_option("--tolerance", options.tolerance,
+                  "Largest residual of a step that counts as converged, over the weight of the sheet")
+      ->check(number_between(1e-12, 1))  // of numbers with 16 digits; at 1 nothing is solved
+      ->capture_default_str();
+  group
+      .add_option("--grasp-shape", options.grasp_shape,
+                  "How the patch sits in the fingers, in place of what the recording says")
+      ->check(CLI::IsMember({"clamp", "point", "pinch"}));
+  group
+      .add_option("--grasp-within", options.grasp_within,
+                  "Size of the grasped patch in place of the recording's [m]")
+      ->check(positive_number());
+  add_grasp_cell_option(group, options.grasp_cell);
+  group.add_flag("--clamp-slopes", options.clamp_slopes,
+                 "A clamped patch does not bend: it holds the sheet's slope as well as its place");
+  CLI::Option* const layers =
+      group
+          .add_option(
+              "--self-contact", options.self_contact,
+              "The object meets itself: distance from which on its layers feel each other, as 0.001 [m]; "
+              "without it, it passes through itself")
+          ->check(positive_number());
+  group
+      .add_option("--layer-friction", options.layer_friction,
+                  "Coulomb coefficient of layer on layer; without it, that of the object")
+      ->check(number_from(0))
+      ->needs(layers);
+  group.add_option("--from", options.from, "Keyframes before do not count, from the recording's start [s]")
+      ->check(any_number());
+  group.add_option("--to", options.to, "Keyframes after do not count, from the recording's start [s]")
+      ->check(any_number());
+  group.add_option("--distance", options.distance, "How point distances become one number")
+      ->check(CLI::IsMember({"mean", "trimmed", "huber"}))
+      ->capture_default_str();
+  group.add_option("--trim", options.trim, "trimmed: share of the largest distances left out")
+      ->check(number_between(0, 0.5))
+      ->capture_default_str();
+  group.add_option("--huber", options.huber, "huber: where the distance stops counting in full [m]")
+      ->check(positive_number())
+      ->capture_default_str();
+  group
+      .add_option("--sigma", options.sigmas,
+                  "Noise of what was observed, as force=0.02: cloud, contour, markers [m] or force [N]; "
+                  "terms count by it")
+      ->allow_extra_args(false);
+  group.add_flag(
+      "--two-sided", options.two_sided,
+      "Simulated cloth inside the crop where none was seen counts too: for recordings that see all of it");
+  add_list_option(group, "--share", options.shared,
+                  "Errors of registration that all recordings have in common",
+                  CLI::IsMember({"offset", "yaw", "time-offset"}));
+}
+
+sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions& options, int threads) {
+  sysid::ReplaySettings settings;
+  settings.solver.time_step = options.time_step;
+  settings.solver.max_iterations = options.iterations;
+  settings.solver.tolerance = options.tolerance;
+  settings.mesh = options.mesh;
+  settings.threads = threads;
+  settings.clamp_slopes = options.clamp_slopes;
+  if (options.self_contact > 0)
+    settings.self_contact =
+        sim::SelfContact{.thickness = options.self_contact, .friction = options.layer_friction};
+  if (options.grasp_within > 0) settings.grasp_within = options.grasp_within;
+  settings.grasp_cell = options.grasp_cell;
+  settings.grasp_shape = data::parse_grasp_shape(options.grasp_shape);  // empty: as recorded
+  settings.solver.stop = &stop_on_signals();
+  if (verb.count("--from") > 0) settings.score_from = options.from;
+  if (verb.count("--to") > 0) settings.score_to = options.to;
+  return settings;
+}
+
+sysid::ScoreSettings score_settings(const ReplayOptions& options) {
+  sysid::ScoreSettings settings;
+  settings.objective.robust.kind = options.distance == "mean"    ? sysid::RobustKind::plain
+                                   : options.distance == "huber" ? sysid::RobustKind::huber
+                                                                 : sysid::RobustKind::trimmed;
+  settings.objective.robust.trim_fraction = options.trim;
+  settings.objective.robust.huber_delta = options.huber;
+  for (const std::string& assignment : options.sigmas) set_sigma(assignment, settings.objective);
+  settings.objective.two_sided = options.two_sided;
+  const auto shares = [&](const char* name) {
+    return std::find(options.shared.begin(), options.shared.end(), name) != options.shared.end();
+  };
+  settings.shared = {shares("offset"), shares("yaw"), shares("time-offset")};
+  return settings;
+}
+
+void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values) {
+  CLI::App& group = *verb.add_option_group("Searched parameters",
+                                           "low:high:count[:log] or a list a,b,c; --hold takes one value");
+  for (const sysid::Parameter& info : sysid::known_parameters()) {
+    const std::string unit = info.unit.empty() ? "" : " [" + info.unit + "]";
+    group
+        .add_option_function<std::string>(
+            sysid::option_of(info.name),
+            [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
+            info.meaning + unit)
+        ->type_name("VALUES");
+  }
+}
+
+void add_hold_option(CLI::App& verb, std::vector<std::string>& holds, const std::string& meaning) {
+  verb.add_option("--hold", holds, meaning)->allow_extra_args(false);
+}
+
+std::vector<sysid::Hold> parse_holds(const std::vector<std::string>& texts) {
+  std::vector<sysid::Hold> holds;
+  std::set<std::string> names;
+  for (const std::string& text : texts) {
+    holds.push_back(sysid::parse_hold(text));
+    const std::string& name = holds.back().axis.name;
+    if (!names.insert(name).second)
+      throw data::InputError("--hold " + name + ": given twice, expected one value");
+  }
+  return holds;
+}
+
+std::vector<sysid::Axis> axes_of(const std::vector<sysid::Hold>& holds) {
+  std::vector<sysid::Axis> axes;
+  for (const sysid::Hold& hold : holds) axes.push_back(hold.axis);
+  return axes;
+}
+
+std::vector<sysid::Axis> parse_values(const std::vector<std::string>& texts) {
+  const std::vector<sysid::Hold> holds = parse_holds(texts);
+  for (const sysid::Hold& hold : holds)
+    if (hold.deviation)
+      throw data::InputError("--hold " + hold.axis.name +
+                             ": found a standard deviation, expected one value: nothing is estimated here");
+  return axes_of(holds);
+}
+
+sysid::Axis parse_searched(const std::string& name, const std::string& specification) {
+  sysid::Axis axis = sysid::parse_axis(name, specification);
+  if (axis.values.size() < 2)
+    throw data::InputError(sysid::option_of(name) +
+                           ": found one value, expected a range, as low:high:count; hold it as --hold " +
+                           name + "=" + data::format_short(axis.values.front()));
+  return axis;
+}
+
+void say(const CommonOptions& options, const std::string& line) {
+  if (!options.quiet) std::cerr << data::message_line(line) << '\n';
+}
+
+void warn(const std::string& line) {
+  std::cerr << "flash-sysid: warning: " << data::message_line(line) << '\n';
+}
+
+void warn_of_doubts(const data::Recording& recording) {
+  for (const std::string& doubt : recording.doubts) warn(recording.source + ": " + doubt);
+}
+
+void warn_of_camera(const data::Recording& recording) {
+  if (!recording.camera) return;
+  for (const std::string& warning : recording.camera->warnings)
+    warn(recording.name + ": calibration of its camera: " + warning);
+}
+
+void warn_of_seams(const data::Recording& recording) {
+  if (recording.is_solid()) return;
+  // Of a file as it stands, not as it is refined about a grasp.
+  const bool of_file = !recording.mesh_spec.empty() && !data::is_made_on_the_spot(recording.mesh_spec);
+  const std::string seams =
+      data::seam_warning(of_file ? data::load_triangle_mesh(recording.mesh_spec) : recording.mesh);
+  if (!seams.empty()) warn(recording.name + ": " + recording.mesh_spec + ": " + seams);
+}
+
+void tell_known_before(const CommonOptions& options, const std::vector<sysid::Replay>& replays,
+                       const sysid::GridSettings& settings) {
+  const sysid::KnownBefore known = sysid::known_before(replays, settings);
+  for (const std::string& warning : known.warnings) warn(warning);
+  for (const std::string& notice : known.notices) say(options, notice);
+}
+
+int thread_count(const CommonOptions& options) {
+  return options.threads > 0 ? options.threads
+                             : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void check_keeps_motions(const std::string& option, const std::string& folder) {
+  try {
+    data::check_folder_writable(folder);
+  } catch (const data::InputError& error) {
+    throw data::InputError(option + ": " + error.what() + ", expected a folder that takes files");
+  }
+}
+
+void check_device(const CommonOptions& options, const sysid::ReplaySettings& settings) {
+  if (settings.self_contact && options.device.starts_with("cuda"))
+    throw data::InputError("--device " + options.device +
+                           ": --self-contact is simulated on the CPU alone; use --device cpu or auto");
+}
+
+void place_simulation(const CommonOptions& options, const data::Asset& asset,
+                      sysid::ReplaySettings& settings) {
+  check_device(options, settings);
+  const bool on_cpu = asset.element_type == data::ElementType::tetrahedron || settings.self_contact;
+  const sim::DeviceChoice choice =
+      sim::choose_device(options.device == "auto" && on_cpu ? "cpu" : options.device);
+  settings.device = choice.device;
+  settings.cuda_devices = choice.cuda_devices;
+}
+
+void place_candidates(const CommonOptions& options, const std::vector<sysid::ReplayCandidate>& candidates,
+                      std::vector<sysid::Replay>& replays) {
+  if (replays.front().settings.device != sim::Device::cuda) return;
+  const std::string why = sysid::why_not_on_device(replays.front(), candidates);
+  if (why.empty()) return;
+  if (options.device != "auto")
+    throw data::InputError("--device " + options.device + ": " + why + "; use --device cpu or auto");
+  say(options, "--device auto takes the CPU: " + why);
+  for (sysid::Replay& replay : replays) {
+    replay.settings.device = sim::Device::cpu;
+    replay.settings.cuda_devices.clear();
+  }
+}
+
+std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,
+                                             const CommonOptions& options) {
+  std::vector<data::Recording> recordings;
+  std::map<std::string, std::string> known;  // sources by content
+  std::vector<std::string> names;
+  for (const std::string& path : paths) {
+    recordings.push_back(data::load_recording(path));
+    const data::Recording& recording = recordings.back();
+    warn_of_doubts(recording);
+    names.push_back(recording.name);
+    if (paths.size() == 1) break;
+    const auto [same, is_new] = known.emplace(data::observed_sha256(recording), recording.source);
+    if (!is_new)
+      throw data::InputError(recording.source + ": is the same recording as " + same->second +
+                             ", expected each once: twice would count as two trials");
+  }
+  names = sysid::told_apart(names);
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    if (names[r] == recordings[r].name) continue;
+    say(options, recordings[r].source + ": is called " + names[r] + " here, as another recording is named " +
+                     recordings[r].name + " too");
+    recordings[r].name = names[r];
+  }
+  return recordings;
+}
+
+data::Asset load_asset_for(const std::string& path, const data::Recording& recording) {
+  if (!path.empty()) return data::load_asset(path);
+  if (recording.asset.empty())
+    throw data::InputError("--asset: none given, and " + recording.source + " names none in object.asset");
+  return data::load_asset(recording.asset);
+}
+
+void check_kind(const data::Asset& asset, const data::Recording& recording) {
+  const bool solid = asset.element_type == data::ElementType::tetrahedron;
+  if (solid == recording.is_solid()) return;
+  throw data::input_error(asset.source, "element_type",
+                          std::string("found ") + (solid ? "TETRAHEDRON" : "TRIANGLE") + ", expected " +
+                              (solid ? "TRIANGLE" : "TETRAHEDRON") + ", as object.mesh of " +
+                              recording.source + " is a " + (solid ? "sheet" : "solid"));
+}
+
+void check_options(const ReplayOptions& options, const data::Asset& asset) {
+  if (asset.element_type == data::ElementType::tetrahedron && options.clamp_slopes)
+    throw data::InputError(
+        "--clamp-slopes: found a solid, expected a sheet: a solid has no slopes of its own");
+}
+
+sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sheet,
+                                  std::vector<std::string>& notices, const std::vector<sysid::Axis>& fixed) {
+  sysid::MaterialBase base;
+  std::vector<std::string> said;
+  if (asset.element_type == data::ElementType::tetrahedron) {
+    const double volume = sheet.vertex_volume.sum();
+    base.solid = data::resolve_solid(asset, volume).material;
+    said = data::resolve_solid(with_fixed(asset, fixed), volume).notices;
+  } else {
+    const double area = sheet.vertex_area.sum();
+    base.material = data::resolve_sheet(asset, area).material;
+    base.thickness = asset.thickness;
+    base.bending_from_thickness = asset.thickness && !asset.bending_rigidity && !asset.published_bending;
+    said = data::resolve_sheet(with_fixed(asset, fixed), area).notices;
+  }
+  notices.insert(notices.end(), said.begin(), said.end());
+  return base;
+}
+
+namespace {
+
+std::string left_text(double seconds) { return "about " + duration_text(seconds) + " left"; }
+
+}  // namespace
+
+ProgressLine::ProgressLine(const CommonOptions& options)
+    : visible_(!options.quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+
+ProgressLine::~ProgressLine() {
+  if (drawn_) std::cerr << '\n';
+}
+
+/// `share`: of the way.
+bool ProgressLine::due(double share) {
+  if (!visible_) return false;
+  if (terminal_ || share >= 1) return true;
+  const int tenths = static_cast<int>(10 * share);
+  const double since = std::chrono::duration<double>(Clock::now() - last_).count();
+  if (since < 30 && (tenths == tenths_ || since < 1)) return false;
+  tenths_ = tenths;
+  return true;
+}
+
+void ProgressLine::show(const sysid::Progress& progress, std::optional<double> seconds_left) {
+  if (!due(static_cast<double>(progress.done) / std::max(1, progress.total))) return;
+  char line[160];
+  std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, best %.2f mm%s", progress.done,
+                progress.total, progress.candidates_per_second, 1000 * progress.best_score,
+                seconds_left ? (", with the answer " + left_text(*seconds_left)).c_str() : "");
+  draw(line);
+}
+
+void ProgressLine::show(const sysid::AnswerMeter& meter, std::optional<double> seconds_left) {
+  const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
+  // Below 1: what is expected is never over.
+  if (!due(seconds_left ? elapsed / (elapsed + std::max(*seconds_left, 1e-3)) : 0)) return;
+  const auto part = [](int count, int of, const std::string& what) {
+    return data::format_count(static_cast<std::size_t>(count)) + " of at most " +
+           data::format_count(static_cast<std::size_t>(of)) + what;
+  };
+  draw("the answer: " + part(meter.done().motions, meter.most().motions, " motions, ") +
+       part(meter.done().scores, meter.most().scores, " scores between them") +
+       (seconds_left ? ", " + left_text(*seconds_left) : ""));
+}
+
+void ProgressLine::draw(const std::string& line) {
+  last_ = Clock::now();
+  drawn_ = terminal_;
+  std::cerr << (terminal_ ? "\r" : "") << line << (terminal_ ? "\033[K" : "\n") << std::flush;
+}
+
+}  // namespace flash

@@ -1,9 +1,0 @@
-#include "data/error.h"
-
-#include "data/message_line.h"
-
-namespace flash::data {
-
-InputError::InputError(const std::string& message) : std::runtime_error(message_line(message)) {}
-
-}  // namespace flash::data

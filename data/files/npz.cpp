@@ -1,0 +1,123 @@
+#include "data/files/npz.h"
+
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <string_view>
+
+#include "data/files/atomic_file.h"
+#include "data/files/error.h"
+#include "data/files/text.h"
+
+namespace flash::data {
+namespace {
+
+/// A number of the ZIP format, little endian; throws beyond the end of the file.
+template <class Number>
+Number at(const std::string& file, std::size_t place, const std::string& path) {
+  if (place + sizeof(Number) > file.size()) throw InputError(path + ": ends within its data");
+  Number value;
+  std::memcpy(&value, file.data() + place, sizeof value);
+  return value;
+}
+
+/// The value of a key in the header of an array, a Python dictionary.
+std::string_view value_of(std::string_view header, std::string_view key, std::string_view ends) {
+  const std::size_t begin = header.find(key);
+  if (begin == std::string_view::npos) return {};
+  const std::string_view rest = header.substr(begin + key.size());
+  return rest.substr(0, rest.find_first_of(ends));
+}
+
+template <class Number>
+std::vector<double> converted(std::string_view bytes) {
+  std::vector<Number> numbers(bytes.size() / sizeof(Number));
+  std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(Number));
+  return {numbers.begin(), numbers.end()};
+}
+
+/// "(480, 640)"
+std::vector<std::size_t> shape_of(std::string_view text) {
+  std::vector<std::size_t> shape;
+  for (const std::string_view word : split(text, " ,"))
+    if (const std::optional<long> size = parse_integer(word); size && *size >= 0)
+      shape.push_back(static_cast<std::size_t>(*size));
+  return shape;
+}
+
+std::size_t count_of(const std::vector<std::size_t>& shape) {
+  std::size_t count = 1;
+  for (const std::size_t size : shape) count *= size;
+  return count;
+}
+
+/// Empty of an array that is no list of real numbers.
+NumpyArray array_of(std::string_view npy) {
+  if (!npy.starts_with("\x93NUMPY") || npy.size() < 12) return {};
+  const bool first_version = npy[6] == 1;
+  const std::size_t begin = first_version ? 10 : 12;
+  const auto byte = [&](std::size_t i) {
+    return static_cast<std::size_t>(static_cast<unsigned char>(npy[i]));
+  };
+  std::size_t length = byte(8) + 256 * byte(9);
+  if (!first_version) length += 65536 * byte(10);
+  if (begin + length > npy.size()) return {};
+  const std::string_view header = npy.substr(begin, length), bytes = npy.substr(begin + length);
+  const std::string_view type = value_of(header, "'descr': '", "'");
+  NumpyArray array{.shape = shape_of(value_of(header, "'shape': (", ")")), .values = {}};
+  std::vector<double>& values = array.values;
+  if (type == "<f8") values = converted<double>(bytes);
+  if (type == "<f4") values = converted<float>(bytes);
+  if (type == "<i8") values = converted<std::int64_t>(bytes);
+  if (type == "<i4") values = converted<std::int32_t>(bytes);
+  if (type == "<u4") values = converted<std::uint32_t>(bytes);
+  if (type == "<u2") values = converted<std::uint16_t>(bytes);
+  array.whole = !type.empty() && type.size() == 3 && type[1] != 'f';
+  const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
+  if (columns_first && array.shape.size() == 2 && values.size() == count_of(array.shape)) {
+    const std::size_t rows = array.shape[0], columns = array.shape[1];
+    const std::vector<double> stored = values;
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = stored[(i % columns) * rows + i / columns];
+  }
+  return array;
+}
+
+}  // namespace
+
+std::map<std::string, std::vector<double>> load_npz(const std::string& path) {
+  const std::string file = read_file(path);
+  const std::size_t end = file.rfind("PK\x05\x06");
+  if (end == std::string::npos) throw InputError(path + ": no .npz: found no table of contents");
+  std::map<std::string, std::vector<double>> arrays;
+  std::size_t entry = at<std::uint32_t>(file, end + 16, path);
+  const auto count = at<std::uint16_t>(file, end + 10, path);
+  for (std::uint16_t i = 0; i < count; ++i) {
+    const auto method = at<std::uint16_t>(file, entry + 10, path);
+    const auto size = at<std::uint32_t>(file, entry + 20, path);
+    const auto name_length = at<std::uint16_t>(file, entry + 28, path);
+    const auto extra = at<std::uint16_t>(file, entry + 30, path),
+               comment = at<std::uint16_t>(file, entry + 32, path);
+    const std::size_t local = at<std::uint32_t>(file, entry + 42, path);
+    at<char>(file, entry + 46 + name_length, path);
+    std::string name = file.substr(entry + 46, name_length);
+    if (name.ends_with(".npy")) name.resize(name.size() - 4);
+    if (method != 0)
+      throw InputError(path + ": " + name +
+                       " is compressed; write it with numpy.savez, or as camera_info.yaml");
+    const std::size_t begin =
+        local + 30 + at<std::uint16_t>(file, local + 26, path) + at<std::uint16_t>(file, local + 28, path);
+    if (begin + size > file.size()) throw InputError(path + ": " + name + ": ends within its data");
+    arrays[name] = array_of(std::string_view(file).substr(begin, size)).values;
+    entry += 46U + name_length + extra + comment;
+  }
+  return arrays;
+}
+
+NumpyArray load_npy(const std::string& path) {
+  NumpyArray array = array_of(read_file(path));
+  if (array.values.empty() || array.values.size() != count_of(array.shape))
+    throw InputError(path + ": found no array of real numbers, expected what numpy.save writes of one");
+  return array;
+}
+
+}  // namespace flash::data
