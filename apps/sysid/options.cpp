@@ -167,7 +167,7 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
       ->needs(layers);
   group.add_option("--from", options.from, "Keyframes before do not count, from the recording's start [s]")
       ->check(any_number());
-  group.add_option("--to", options.to, "Keyframes after do not count, from the recording's start [s]")
+  group.add_option("--until", options.to, "Keyframes after do not count, from the recording's start [s]")
       ->check(any_number());
   group.add_option("--distance", options.distance, "How point distances become one number")
       ->check(CLI::IsMember({"mean", "trimmed", "huber"}))
@@ -207,7 +207,7 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
   settings.grasp_shape = data::parse_grasp_shape(options.grasp_shape);  // empty: as recorded
   settings.solver.stop = &stop_on_signals();
   if (verb.count("--from") > 0) settings.score_from = options.from;
-  if (verb.count("--to") > 0) settings.score_to = options.to;
+  if (verb.count("--until") > 0) settings.score_to = options.to;
   return settings;
 }
 

@@ -41,7 +41,7 @@ int run_repeatability(const CLI::App& verb, const RepeatabilityOptions& options)
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   sysid::RepeatabilitySettings settings;
   if (verb.count("--from") > 0) settings.score_from = options.from;
-  if (verb.count("--to") > 0) settings.score_to = options.to;
+  if (verb.count("--until") > 0) settings.score_to = options.to;
   const sysid::Repeatability found = sysid::measure_repeatability(recordings[0], recordings[1], settings);
   for (const std::string& name : found.bounds_hit)
     warn(name + " between the trials is at its bound in " + recordings[0].source +
@@ -67,7 +67,7 @@ void add_repeatability_verb(CLI::App& app, Action& action) {
       ->required()
       ->expected(2);
   verb->add_option("--from", options->from, "Leave out keyframes before this time [s]");
-  verb->add_option("--to", options->to, "Leave out keyframes after this time [s]");
+  verb->add_option("--until", options->to, "Leave out keyframes after this time [s]");
   add_common_options(*verb, options->common);
   verb->footer("Example:\n  flash-sysid repeatability lift lift_again --from 1");
   verb->callback(

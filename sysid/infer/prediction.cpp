@@ -259,8 +259,9 @@ Prediction predict(const Replay& replay, const std::vector<ReplayResult>& motion
   if (std::none_of(
           replay.observations.begin(), replay.observations.end(),
           [](const Observation& observation) { return observation.weight > 0 && observation.seen(); }))
-    throw data::InputError(replay.recording.source +
-                           ": no keyframe counts, expected one with enough points between --from and --to");
+    throw data::InputError(
+        replay.recording.source +
+        ": no keyframe counts, expected one with enough points between --from and --until");
   Prediction prediction;
   prediction.fit = register_motions({registration_problem(replay, motions.front().motion)},
                                     settings.objective, settings.registration)

@@ -43,7 +43,7 @@ void check_job(const std::vector<Replay>& replays, double candidates, const Memo
       return data::format_count(static_cast<std::size_t>(std::min(std::ceil(bytes / 1e6), 1e15)));
     };
     std::string remedy = 2 * memory.keyframes > memory.total()
-                             ? "fewer keyframes: a shorter --from to --to, or fewer times of the tracks"
+                             ? "fewer keyframes: a shorter --from to --until, or fewer times of the tracks"
                          : memory.kept > memory.simulation      ? "fewer values or a coarser --mesh"
                          : 2 * memory.steps > memory.simulation ? "a longer --time-step or a coarser --mesh"
                                                                 : "a coarser --mesh";

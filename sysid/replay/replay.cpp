@@ -63,7 +63,7 @@ void take_solid(Replay& replay) {
   replay.surface.vertices = solid.rest.vertices(replay.surface_vertices, Eigen::all);
 }
 
-/// Throws data::InputError where --from and --to leave nothing to score.
+/// Throws data::InputError where --from and --until leave nothing to score.
 void check_window(const Replay& replay) {
   if (replay.observations.empty())
     throw data::input_error(replay.recording.source, "keyframes", "there is none");

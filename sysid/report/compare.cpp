@@ -49,7 +49,7 @@ void check_comparable(const FinishedSearch& first, const FinishedSearch& other) 
       throw data::input_error(other.name, first.summary.recordings[r].name,
                               "found " + observed_in(other.residuals[r]) + ", expected " +
                                   observed_in(first.residuals[r]) + " as in " + first.name +
-                                  ": search all with --no-horizon, or with one --from and --to");
+                                  ": search all with --no-horizon, or with one --from and --until");
 }
 
 /// Of each search what is not alike in all; "-" where there is none.

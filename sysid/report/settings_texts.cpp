@@ -164,7 +164,7 @@ std::vector<std::string> unlike_the_search(const data::Asset& asset,
   for (const auto& [name, option] : kOptions) differs(option, here(name), searched(name));
   if (search.contains("min_points")) {  // earlier programs did not say which keyframes counted
     differs("--from", here("score_from_s"), searched("score_from_s"));
-    differs("--to", here("score_to_s"), searched("score_to_s"));
+    differs("--until", here("score_to_s"), searched("score_to_s"));
     differs("--share", here("share"), searched("share"));
     const auto is_two_sided = [](const std::string& observed) {
       return observed.find(two_sided_term) != std::string::npos ? "yes" : "no";

@@ -132,7 +132,7 @@ def refusals(sim, sysid, calib):
         ([*grid, "--start-yaw", "a"], ["--start-yaw", "\"a\" is not a number"]),
         ([*grid, "--bending", "1e-4,2e-4", "--hold", "foo=1"], ["--hold foo", "unknown parameter"]),
         ([*grid, "--bending", "1e-5:1e-3:3", "--grasp-depth", "0.01:0.03:2"], ["--grasp-depth", "pinch"]),
-        *[([*words, "--from", "3"], ["--from, --to", "no keyframe between", "0 to 0.6 s"]) for words in (
+        *[([*words, "--from", "3"], ["--from, --until", "no keyframe between", "0 to 0.6 s"]) for words in (
             [*grid, "--bending", "1e-4,2e-4"], [sysid, "replay", "recording", "--asset", "asset.json", "-o", "out"])],
         *([] if calib is None else [
             *[([calib, verb, ".", "--depth-scale", scale, "--target", "chessboard:9x6:0.025"],

@@ -12,7 +12,7 @@ import other_simulators
 import runs as kept
 
 SHARE = 0.1  # of an interval
-WINDOW = ["--from", "1.0", "--to", "2.4", "--mesh", lifts.MESH, "--no-plan", "--no-solver-check"]
+WINDOW = ["--from", "1.0", "--until", "2.4", "--mesh", lifts.MESH, "--no-plan", "--no-solver-check"]
 # Limp cloths at a hundredth of the default tolerance: on the way to its folds such a cloth takes one of several ways, and at
 # 1e-3 rounding decides which.
 REAL = {

@@ -47,7 +47,7 @@ def write_asset(out, name="cloth", **properties):
 def window(clip):
     """Keyframes 10 to 24; the trimmed mean is the default. The tolerance is a hundredth of the default: on the way to its folds
     a limp cloth takes one of several ways, and at 1e-3 rounding decides which."""
-    return ["--from", CLIPS.get(clip, {}).get("from", "1.0"), "--to", "2.4", "--mesh", MESH, "--tolerance", "1e-5"]
+    return ["--from", CLIPS.get(clip, {}).get("from", "1.0"), "--until", "2.4", "--mesh", MESH, "--tolerance", "1e-5"]
 
 
 SEARCH = ("--no-plan",)  # what to record next is not asked

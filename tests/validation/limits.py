@@ -26,6 +26,6 @@ def free_pose(runs, recording, clip, asset, options, parameters):
     for frame in range(10, 25, 2):
         time = f"{frame / 10:.1f}"
         replay = runs.replay(f"{clip}/free_pose/{frame:03d}", recording, parameters, "--asset", asset, "--mesh",
-                             lifts.MESH, "--from", time, "--to", time, *options)
+                             lifts.MESH, "--from", time, "--until", time, *options)
         scores.append(replay["score"])
     return sum(scores) / len(scores)

@@ -105,7 +105,7 @@ TEST(Compare, RefusesOtherObservationsByName) {
         compare({first, other});
       }),
       "b: lift: found 60 observations from 1 to 1.75 s, expected 60 observations from 1 to 2 s as in a: "
-      "search all with --no-horizon, or with one --from and --to");
+      "search all with --no-horizon, or with one --from and --until");
 }
 
 TEST(ResidualsFile, ComesBackAsItWas) {
