@@ -47,7 +47,8 @@ void check_variations(const std::vector<SceneBody>& bodies, const std::vector<Va
   for (const Variation& variation : variations)
     if (std::none_of(bodies.begin(), bodies.end(),
                      [&](const SceneBody& body) { return applies(variation, body.environment); }))
-      throw data::InputError("--vary " + variation.name + ": no object has it");
+      throw data::InputError("--vary " + variation.name +
+                             ": no object has it, or only as 0, which no factor changes");
 }
 
 WorldSettings settings_of(const data::SceneSolver& solver, double time_step) {

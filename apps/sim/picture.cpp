@@ -17,6 +17,8 @@
 #include "data/picture/mesh_picture.h"
 #include "data/scene/obstacle_surfaces.h"
 #include "data/scene/scene.h"
+#include "sim/scene/scene.h"
+#include "sim/scene_worlds.h"
 
 namespace flash {
 namespace {
@@ -43,13 +45,25 @@ double time_of(const std::string& frame, const data::Scene& scene) {
   return *step * scene.time_step;
 }
 
+/// Throws where the frame has other vertices than the scene's objects: it is of another scene or mesh.
+void check_frame(const std::string& frame, const data::Scene& scene) {
+  std::vector<std::string> notices;
+  const auto expected = static_cast<Eigen::Index>(sim::vertices_of(sim::scene_bodies(scene, 1, notices)));
+  const Eigen::Index found = data::load_geometry(frame).points.rows();
+  if (found != expected)
+    throw data::InputError(frame + ": found " + std::to_string(found) + " vertices, expected the " +
+                           std::to_string(expected) + " of " + scene.source + " (--scene)");
+}
+
 /// Adds what the scene stands on, in grey, and turns all so that gravity points down.
 void add_scene(const std::string& path, const std::string& frame, std::vector<data::PicturedMesh>& pictured) {
   const data::Scene scene = data::load_scene(path);
+  const double time = time_of(frame, scene);
+  check_frame(frame, scene);
   Eigen::AlignedBox3d about;
   for (const data::PicturedMesh& each : pictured)
     for (const auto& vertex : each.mesh.vertices.rowwise()) about.extend(vertex.transpose());
-  for (data::TriangleMesh& surface : data::obstacle_surfaces(scene, time_of(frame, scene), about))
+  for (data::TriangleMesh& surface : data::obstacle_surfaces(scene, time, about))
     pictured.push_back({std::move(surface), of_obstacles});
   if (!(scene.gravity.norm() > 0)) return;
   const auto upright = Eigen::Quaterniond::FromTwoVectors(-scene.gravity, Eigen::Vector3d::UnitZ());

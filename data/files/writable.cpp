@@ -27,6 +27,8 @@ fs::file_status status_of(const fs::path& place, const std::string& path) {
   std::error_code code;
   const fs::file_status status = fs::status(place, code);
   if (!fs::status_known(status)) throw refusal(path, code.message());
+  if (!fs::exists(status) && fs::is_symlink(fs::symlink_status(place, code)))
+    throw refusal(path, place.string() + " is a link to a place that is not there");
   return status;
 }
 

@@ -30,6 +30,15 @@ void scale_friction(double factor, Environment& environment) {
   if (environment.self_contact) environment.self_contact->friction *= factor;
 }
 
+bool has_friction(const Environment& environment) {
+  bool found = environment.self_contact && environment.self_contact->friction > 0;
+  for (const data::SheetMaterial& material : environment.materials) found = found || material.friction > 0;
+  for (const auto& [body, solid] : environment.solids) found = found || solid.friction > 0;
+  for (const Obstacle& obstacle : environment.obstacles)
+    for (const double friction : obstacle.friction) found = found || friction > 0;
+  return found;
+}
+
 void scale(const std::string& name, double factor, Environment& environment) {
   if (name == "friction") return scale_friction(factor, environment);
   for (data::SheetMaterial& material : environment.materials) {
@@ -82,7 +91,13 @@ std::vector<Variation> parse_variations(const std::string& text, const std::stri
 }
 
 bool applies(const Variation& variation, const Environment& environment) {
-  return variation.name != "bending" || environment.materials.size() > environment.solids.size();
+  if (variation.name == "friction") return has_friction(environment);
+  if (variation.name != "bending") return true;
+  for (std::size_t body = 0; body < environment.materials.size(); ++body)
+    if (environment.solids.count(static_cast<int>(body)) == 0 &&
+        environment.materials[body].bending_rigidity > 0)
+      return true;
+  return false;
 }
 
 double factor_of(const std::vector<Variation>& variations, std::size_t index, int number) {

@@ -23,7 +23,7 @@ inline constexpr std::array variation_names = {"young", "bending", "density", "f
 /// Reads "bending=0.5:2:log,friction=0.2:0.8". Throws data::InputError, naming `option`.
 std::vector<Variation> parse_variations(const std::string& text, const std::string& option);
 
-/// Whether an environment has what would differ.
+/// Whether an environment has what would differ, and not as 0, which no factor changes.
 bool applies(const Variation& variation, const Environment& environment);
 
 /// The factor of `variations[index]` in environment `number`. Environment 0 is the scene itself, and has 1.

@@ -25,6 +25,7 @@ TEST(Writable, OthersAreRefusedWithTheReason) {
   const TemporaryFolder folder;
   const std::string file = folder.write("file", "mine");
   std::filesystem::create_symlink("loop", folder / "loop");
+  std::filesystem::create_symlink("gone", folder / "link");
   const auto expect = [](const std::string& path, const auto& check, const std::string& reason) {
     EXPECT_EQ(input_error_of([&] { check(path); }), path + ": cannot be written: " + reason);
   };
@@ -33,6 +34,7 @@ TEST(Writable, OthersAreRefusedWithTheReason) {
     expect(file + "/below/it", check, "Not a directory");
     expect((folder / "loop") + "/out", check, "Too many levels of symbolic links");
     expect(folder / std::string(300, 'x'), check, "File name too long");
+    expect(folder / "link", check, (folder / "link") + " is a link to a place that is not there");
   }
   expect(folder / ".", check_file_writable, "it is a folder, expected a file");
   expect("/", check_file_writable, "it is a folder, expected a file");

@@ -79,5 +79,19 @@ TEST(Variation, ScalesWhatItNamesAndNothingElse) {
   EXPECT_TRUE(applies(young[0], environment));
 }
 
+TEST(Variation, DoesNotApplyToWhatIsZero) {
+  Environment environment;
+  environment.materials[0].bending_rigidity = 0;
+  environment.materials[0].friction = 0;
+  environment.obstacles.resize(1);
+  const Variation bending{"bending", 0.5, 2, false}, friction{"friction", 0.5, 2, false};
+  EXPECT_FALSE(applies(bending, environment));
+  EXPECT_FALSE(applies(friction, environment));
+  environment.obstacles[0].friction = {0.2};
+  EXPECT_TRUE(applies(friction, environment));
+  environment.materials[0].bending_rigidity = 1e-5;
+  EXPECT_TRUE(applies(bending, environment));
+}
+
 }  // namespace
 }  // namespace flash::sim
