@@ -99,29 +99,60 @@ std::string fault_of(const std::vector<RawView>& views, const std::vector<CellFr
   return cell_fault(frames, table ? std::optional(table->plane) : std::nullopt, places_of(views), settings);
 }
 
-// Which usual mistake about the pose of the cameras would make a cell of it, for people to read; may be
-// empty.
-std::string suspected_pose(const std::vector<RawView>& views, const std::vector<double>& times,
-                           const SegmentFolderSettings& settings) {
+/// The poses that a cell is made of.
+struct CellPoses {
+  std::vector<RawView> views;
+  std::optional<data::Trajectory> gripper;
+};
+
+template <typename Change>
+void change_cameras(CellPoses& poses, const Change& change) {
+  for (RawView& view : poses.views)
+    if (view.camera) view.base_from_camera = change(view.base_from_camera);
+}
+
+struct PoseMistake {
+  std::string said;  ///< of what was given, for people to read
+  std::function<void(CellPoses&)> mend;
+};
+
+std::vector<PoseMistake> usual_mistakes() {
   using Pose = Eigen::Isometry3d;
   const Pose opengl(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()));
-  const std::array<std::pair<const char*, std::function<Pose(const Pose&)>>, 3> mistakes = {
-      {{"the camera's axes are those of OpenGL (y up, z backwards), where x right, y down, z forwards is "
-        "expected",
-        [&](const Pose& pose) { return pose * opengl; }},
-       {"the pose is that of the base in the camera, where that of the camera in the base is expected",
-        [](const Pose& pose) { return pose.inverse(); }},
-       {"the pose is that of the base in a camera with axes of OpenGL",
-        [&](const Pose& pose) { return (opengl * pose).inverse(); }}}};
-  if (std::none_of(views.begin(), views.end(), [](const RawView& view) { return view.camera; })) return "";
-  for (const auto& [text, right] : mistakes) {
-    std::vector<RawView> other = views;
-    for (RawView& view : other)
-      if (view.camera) view.base_from_camera = right(view.base_from_camera);
+  return {{"the camera's axes are those of OpenGL (y up, z backwards), where x right, y down, z forwards is "
+           "expected",
+           [opengl](CellPoses& poses) {
+             change_cameras(poses, [&](const Pose& pose) { return Pose(pose * opengl); });
+           }},
+          {"the pose is that of the base in the camera, where that of the camera in the base is expected",
+           [](CellPoses& poses) { change_cameras(poses, [](const Pose& pose) { return pose.inverse(); }); }},
+          {"the pose is that of the base in a camera with axes of OpenGL",
+           [opengl](CellPoses& poses) {
+             change_cameras(poses, [&](const Pose& pose) { return (opengl * pose).inverse(); });
+           }},
+          {"the camera's position is in millimetres, where metres are expected",
+           [](CellPoses& poses) {
+             change_cameras(poses, [](Pose pose) {
+               pose.translation() *= 1e-3;
+               return pose;
+             });
+           }},
+          {"the gripper's positions are in millimetres, where metres are expected", [](CellPoses& poses) {
+             if (!poses.gripper) return;
+             for (Pose& pose : poses.gripper->poses) pose.translation() *= 1e-3;
+           }}};
+}
+
+// Which usual mistake about the poses would make a cell of it, for people to read; may be empty.
+std::string suspected_pose(const std::vector<RawView>& views, const std::vector<double>& times,
+                           const SegmentFolderSettings& settings) {
+  for (const PoseMistake& mistake : usual_mistakes()) {
+    CellPoses other{views, settings.gripper};
+    mistake.mend(other);
     try {
-      const std::vector<CellFrame> frames = sampled_frames(other, times, settings.gripper);
-      if (fault_of(other, frames, table_as_asked(frames, settings), settings.segment).empty())
-        return std::string(". It would be one if ") + text;
+      const std::vector<CellFrame> frames = sampled_frames(other.views, times, other.gripper);
+      if (fault_of(other.views, frames, table_as_asked(frames, settings), settings.segment).empty())
+        return ". It would be one if " + mistake.said;
     } catch (const data::InputError&) {  // no table there
     }
   }

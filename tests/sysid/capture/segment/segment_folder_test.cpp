@@ -267,6 +267,17 @@ TEST_F(SegmentFolder, CamerasAndGrippersOfOtherCellsAreRefusedAndTheMistakeIsNam
   EXPECT_NE(message_with(inverse).find("the pose is that of the base in the camera"), std::string::npos)
       << message_with(inverse);
 
+  RawView camera_in_millimetres = view;
+  camera_in_millimetres.base_from_camera.translation() *= 1e3;
+  EXPECT_NE(message_with(camera_in_millimetres).find("if the camera's position is in millimetres"),
+            std::string::npos)
+      << message_with(camera_in_millimetres);
+  const data::Trajectory in_metres = *settings.gripper;
+  for (Eigen::Isometry3d& pose : settings.gripper->poses) pose.translation() *= 1e3;
+  EXPECT_NE(message_with(view).find("if the gripper's positions are in millimetres"), std::string::npos)
+      << message_with(view);
+
+  settings.gripper = in_metres;
   for (Eigen::Isometry3d& pose : settings.gripper->poses) pose.translation().x() += 0.6;
   EXPECT_NE(message_with(view).find("from the nearest point that is seen"), std::string::npos);
   EXPECT_FALSE(fs::exists(folder("other")));
