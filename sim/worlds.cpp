@@ -9,12 +9,12 @@
 #include "data/files/error.h"
 #include "data/files/text.h"
 #include "data/machine/parallel.h"
-#include "data/motion/trajectory.h"
 #include "sim/device_limits.h"
 #include "sim/device_worlds.h"
 #include "sim/environment_checks.h"
 #include "sim/step/body_law.h"
 #include "sim/tensor_entries.h"
+#include "sim/world_arguments.h"
 
 namespace flash::sim {
 
@@ -27,27 +27,6 @@ using Shape = std::vector<std::int64_t>;
 
 static_assert(std::is_standard_layout_v<WorldStatus> && sizeof(WorldStatus) % sizeof(double) == 0);
 constexpr std::int64_t status_columns = sizeof(WorldStatus) / sizeof(double);
-
-constexpr double farthest_place = 1e5;  ///< as of files of scenes [m]
-
-[[noreturn]] void refuse(const char* setter, const std::string& what) {
-  throw InputError("worlds: " + std::string(setter) + ": " + what);
-}
-
-std::string environment_name(int e) { return "environment " + std::to_string(e); }
-
-void check_end_effector(const EndEffector& effector) {
-  const auto expect = [&](bool met, const char* what) {
-    if (!met) refuse("add", effector.name + ": " + what);
-  };
-  expect(effector.half_extents.allFinite() && effector.half_extents.minCoeff() > 0 &&
-             effector.half_extents.maxCoeff() <= farthest_place,
-         "found a box without a size, expected half extents above 0");
-  expect(std::isfinite(effector.threshold) && effector.threshold >= 0,
-         "found a threshold that is none, expected 0 m or more");
-  expect(!effector.friction || (std::isfinite(*effector.friction) && *effector.friction >= 0),
-         "found a friction that is none, expected 0 or more");
-}
 
 void copy_rows(const Points& rows, double* to) { std::copy(rows.data(), rows.data() + rows.size(), to); }
 
@@ -73,40 +52,13 @@ struct Worlds::Storage {
   /// The environments that are meant, each once.
   std::span<const int> numbers_of(const char* setter, const Chosen& environments) const {
     if (environments.all()) return every;
-    std::vector<bool> found(worlds.size());
-    for (const int e : environments.numbers()) {
-      if (e < 0 || e >= size())
-        refuse(setter, "found " + environment_name(e) + ", expected 0 to " + std::to_string(size() - 1));
-      if (found[static_cast<std::size_t>(e)])
-        refuse(setter, "found " + environment_name(e) + " twice, expected each once");
-      found[static_cast<std::size_t>(e)] = true;
-    }
+    check_chosen(setter, environments.numbers(), size());
     return environments.numbers();
   }
 
   const double* entries_of(const char* setter, const char* name, std::span<const int> chosen,
                            const Tensor& numbers, const Shape& shape_of_each) const {
     return sim::entries_of("worlds: " + std::string(setter) + ": " + name, chosen, numbers, shape_of_each);
-  }
-
-  std::vector<Eigen::Isometry3d> poses_of(const char* setter, std::span<const int> chosen,
-                                          const Tensor& poses) const {
-    constexpr double unit_tolerance = 1e-3;  // as of files of trajectories
-    const double* numbers = entries_of(setter, "poses", chosen, poses, {7});
-    std::vector<Eigen::Isometry3d> all;
-    for (std::size_t i = 0; i < chosen.size(); ++i) {
-      const Eigen::Map<const Eigen::Matrix<double, 7, 1>> pose(numbers + 7 * i);
-      const auto expect = [&](bool met, const std::string& what) {
-        if (!met) refuse(setter, "poses: " + environment_name(chosen[i]) + ": " + what);
-      };
-      const double length = pose.tail<4>().norm(), farthest = pose.head<3>().cwiseAbs().maxCoeff();
-      expect(std::abs(length - 1) <= unit_tolerance,
-             "found a quaternion of length " + data::format_short(length) + ", expected 1");
-      expect(farthest <= farthest_place, "found " + data::format_short(farthest) + " m, expected at most " +
-                                             data::format_short(farthest_place) + " m");
-      all.push_back(data::from_vector(pose));
-    }
-    return all;
   }
 
   /// Dense numbers where the environments are.
@@ -122,40 +74,14 @@ struct Worlds::Storage {
 
   void expect_processor(const char* setter) const {
     if (device)
-      refuse(setter, "found environments on a CUDA device, expected those of the CPU, which alone does that");
+      refuse_argument(
+          setter, "found environments on a CUDA device, expected those of the CPU, which alone does that");
   }
 
   void expect_hold(const char* setter, int hold) const {
     if (hold < 0 || hold >= holds)
-      refuse(setter, "found hold " + std::to_string(hold) + ", expected one of " + std::to_string(holds));
-  }
-
-  void check_grasp(int e, int hold, const Grasp& grasp) const {
-    const Hold& own = worlds[static_cast<std::size_t>(e)].start_holds[static_cast<std::size_t>(hold)];
-    const auto expect = [&](bool met, const std::string& what) {
-      if (!met) refuse("grasp", environment_name(e) + ": hold " + std::to_string(hold) + ": " + what);
-    };
-    const bool others = !grasp.vertices.empty() || grasp.reach;
-    expect(others || !own.vertices.empty() || own.reach,
-           "found neither vertices nor a reach, expected one of them");
-    expect(grasp.vertices.empty() || !grasp.reach, "found vertices and a reach, expected one of them");
-    expect(!others || (own.targets.rows() == 0 && own.stiffness.size() == 0),
-           "found other vertices than its own, expected those: it has targets or a stiffness for them");
-    std::vector<int> sorted = grasp.vertices;
-    std::sort(sorted.begin(), sorted.end());
-    expect(sorted.empty() || (sorted.front() >= 0 && sorted.back() < vertices),
-           "found a vertex that is not there, expected 0 to " + std::to_string(vertices - 1));
-    expect(std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end(),
-           "found a vertex twice, expected each once");
-    if (!grasp.reach) return;
-    const Reach& reach = *grasp.reach;
-    expect(std::isfinite(reach.threshold) && reach.threshold >= 0,
-           "found a threshold of " + data::format_short(reach.threshold) + " m, expected 0 or more");
-    expect(reach.half_extents.allFinite() && reach.half_extents.minCoeff() >= 0,
-           "found half extents below 0, expected 0 or more");
-    expect(reach.first_vertex >= 0 && reach.first_vertex < vertices &&
-               reach.first_vertex + std::max(reach.vertex_count, 0) <= vertices,
-           "found a reach of vertices that are not there, expected 0 to " + std::to_string(vertices - 1));
+      refuse_argument(setter,
+                      "found hold " + std::to_string(hold) + ", expected one of " + std::to_string(holds));
   }
 
   /// Sets a material of one body to what `place(environment)` is of each, all or none.
@@ -165,13 +91,13 @@ struct Worlds::Storage {
     const char* setter = "set_materials";
     const std::span<const int> which = numbers_of(setter, environments);
     if (materials.size() != which.size())
-      refuse(setter, "found " + std::to_string(materials.size()) + " materials, expected " +
-                         std::to_string(which.size()));
+      refuse_argument(setter, "found " + std::to_string(materials.size()) + " materials, expected " +
+                                  std::to_string(which.size()));
     constexpr bool solid = std::is_same_v<Material, data::SolidMaterial>;
     if (body < 0 || body >= std::ssize(plan->bodies) ||
         plan->bodies[static_cast<std::size_t>(body)].body.is_solid() != solid)
-      refuse(setter, "found body " + std::to_string(body) + ", expected one of " +
-                         (solid ? "tetrahedra" : "triangles"));
+      refuse_argument(setter, "found body " + std::to_string(body) + ", expected one of " +
+                                  (solid ? "tetrahedra" : "triangles"));
     Environment tried;
     for (std::size_t i = 0; i < which.size(); ++i) {
       const Environment& environment = at(which[i]).environment;
@@ -183,7 +109,7 @@ struct Worlds::Storage {
         body_laws(*plan, tried);
         if (device) check_on_device({tried}, settings);
       } catch (const InputError& error) {
-        refuse(setter, environment_name(which[i]) + ": " + error.what());
+        refuse_argument(setter, environment_name(which[i]) + ": " + error.what());
       }
     }
     for (std::size_t i = 0; i < which.size(); ++i) {
@@ -266,17 +192,18 @@ EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses)
   Storage& s = *storage_;
   s.expect_processor("add");
   check_end_effector(effector);
-  const std::vector<Eigen::Isometry3d> at = s.poses_of("add", s.every, poses);
+  const std::vector<Eigen::Isometry3d> at = poses_of("add", s.every, poses);
   const auto frames_of = [](const World& world) { return world.plan ? std::ssize(world.plan->frames) : 0; };
   for (const int e : s.every) {
     const World &world = s.at(e), &first = s.at(0);
     if (world.steps != s.settings.first_step)
-      refuse("add", environment_name(e) + ": found " + std::to_string(world.steps) +
-                        " steps taken, expected an end effector before the first");
+      refuse_argument("add", environment_name(e) + ": found " + std::to_string(world.steps) +
+                                 " steps taken, expected an end effector before the first");
     if (frames_of(world) != frames_of(first) ||
         world.environment.obstacles.size() != first.environment.obstacles.size())
-      refuse("add", environment_name(e) +
-                        ": found other numbers of frames or obstacles, expected those of environment 0");
+      refuse_argument("add",
+                      environment_name(e) +
+                          ": found other numbers of frames or obstacles, expected those of environment 0");
   }
   EndEffectorNumbers numbers{.frame = 0, .hold = static_cast<int>(s.holds++), .obstacle = -1};
   if (effector.collides) numbers.obstacle = static_cast<int>(s.obstacles++);
@@ -306,10 +233,11 @@ void Worlds::set_poses(const Chosen& environments, int frame, const Tensor& pose
     const World& world = s.at(e);
     const std::ptrdiff_t frames = world.plan ? std::ssize(world.plan->frames) : 0;
     if (frame < 0 || frame >= frames)
-      refuse("set_poses", environment_name(e) + ": found frame " + std::to_string(frame) +
-                              ", expected one of the " + std::to_string(frames) + " of its schedule");
+      refuse_argument("set_poses", environment_name(e) + ": found frame " + std::to_string(frame) +
+                                       ", expected one of the " + std::to_string(frames) +
+                                       " of its schedule");
   }
-  const std::vector<Eigen::Isometry3d> at = s.poses_of("set_poses", chosen, poses);
+  const std::vector<Eigen::Isometry3d> at = poses_of("set_poses", chosen, poses);
   for (std::size_t i = 0; i < chosen.size(); ++i) set_pose(s.at(chosen[i]), frame, at[i], s.time_step());
 }
 
@@ -329,19 +257,19 @@ void Worlds::set_friction(const Chosen& environments, int obstacle, std::span<co
   s.expect_processor(setter);
   const std::span<const int> chosen = s.numbers_of(setter, environments);
   if (friction.size() != chosen.size())
-    refuse(setter, "found " + std::to_string(friction.size()) + " coefficients, expected " +
-                       std::to_string(chosen.size()));
+    refuse_argument(setter, "found " + std::to_string(friction.size()) + " coefficients, expected " +
+                                std::to_string(chosen.size()));
   if (body < 0 || body >= std::ssize(s.plan->bodies))
-    refuse(setter, "found body " + std::to_string(body) + ", expected one of " +
-                       std::to_string(s.plan->bodies.size()));
+    refuse_argument(setter, "found body " + std::to_string(body) + ", expected one of " +
+                                std::to_string(s.plan->bodies.size()));
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const std::ptrdiff_t obstacles = std::ssize(s.at(chosen[i]).environment.obstacles);
     if (obstacle < 0 || obstacle >= obstacles)
-      refuse(setter, environment_name(chosen[i]) + ": found obstacle " + std::to_string(obstacle) +
-                         ", expected one of " + std::to_string(obstacles));
+      refuse_argument(setter, environment_name(chosen[i]) + ": found obstacle " + std::to_string(obstacle) +
+                                  ", expected one of " + std::to_string(obstacles));
     if (!(friction[i] >= 0 && std::isfinite(friction[i])))
-      refuse(setter, environment_name(chosen[i]) + ": found " + data::format_short(friction[i]) +
-                         ", expected a number of 0 or more");
+      refuse_argument(setter, environment_name(chosen[i]) + ": found " + data::format_short(friction[i]) +
+                                  ", expected a number of 0 or more");
   }
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     std::vector<double>& all =
@@ -370,7 +298,8 @@ void Worlds::grasp(const Chosen& environments, int hold, const Grasp& grasp) {
   Storage& s = *storage_;
   const std::span<const int> chosen = s.numbers_of("grasp", environments);
   s.expect_hold("grasp", hold);
-  for (const int e : chosen) s.check_grasp(e, hold, grasp);
+  for (const int e : chosen)
+    check_grasp(e, hold, s.at(e).start_holds[static_cast<std::size_t>(hold)], grasp, s.vertices);
   for (const int e : chosen) sim::grasp(s.at(e), hold, grasp);
 }
 
@@ -512,22 +441,23 @@ void Worlds::load(const Chosen& environments, const Checkpoint& checkpoint) {
   Storage& s = *storage_;
   const std::span<const int> chosen = s.numbers_of("load", environments);
   if (checkpoint.size() != std::ssize(chosen))
-    refuse("load", "found " + std::to_string(checkpoint.size()) + " environments, expected " +
-                       std::to_string(chosen.size()));
+    refuse_argument("load", "found " + std::to_string(checkpoint.size()) + " environments, expected " +
+                                std::to_string(chosen.size()));
   if (chosen.empty()) return;
   const Checkpoint::Saved& saved = *checkpoint.saved_;
-  if (saved.plan != s.plan) refuse("load", "found environments of another plan, expected this one's");
+  if (saved.plan != s.plan)
+    refuse_argument("load", "found environments of another plan, expected this one's");
   if (saved.projective != s.settings.projective.has_value() || saved.time_step != s.time_step())
-    refuse("load", "found environments of another method or time step, expected these");
+    refuse_argument("load", "found environments of another method or time step, expected these");
   if (saved.device != s.settings.device)
-    refuse("load", "found environments of another kind of device, expected this one's");
+    refuse_argument("load", "found environments of another kind of device, expected this one's");
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const Environment& environment = saved.worlds[i].environment;
     if (std::ssize(environment.holds) != s.holds || std::ssize(environment.obstacles) > s.obstacles)
-      refuse("load", environment_name(chosen[i]) + ": found " + std::to_string(environment.holds.size()) +
-                         " holds and " + std::to_string(environment.obstacles.size()) +
-                         " obstacles, expected " + std::to_string(s.holds) + " and at most " +
-                         std::to_string(s.obstacles));
+      refuse_argument("load", environment_name(chosen[i]) + ": found " +
+                                  std::to_string(environment.holds.size()) + " holds and " +
+                                  std::to_string(environment.obstacles.size()) + " obstacles, expected " +
+                                  std::to_string(s.holds) + " and at most " + std::to_string(s.obstacles));
   }
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     s.at(chosen[i]) = copy_of(saved.worlds[i]);
