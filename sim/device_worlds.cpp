@@ -128,7 +128,7 @@ class Stepper final : public DeviceWorlds {
         [&] { memory_.write_velocities(environment, world(environment).environment.state.velocities); });
   }
 
-  void write_material(int environment) override {
+  void write_environment(int environment) override {
     ask_device([&] {
       memory_.write_environment(cuda::replay_environment(world(environment).environment, nullptr),
                                 environment);
@@ -159,7 +159,7 @@ class Stepper final : public DeviceWorlds {
   }
 
   void load(int environment, const std::vector<char>& saved) override {
-    write_material(environment);
+    write_environment(environment);
     ask_device([&] { memory_.load(environment, saved); });
     count_frames(world(environment));
     is_here(environment) = 1;

@@ -23,7 +23,8 @@ class DeviceWorlds {
   // What has been changed in a world from outside:
   virtual void write_state(int environment) = 0;
   virtual void write_velocities(int environment) = 0;
-  virtual void write_material(int environment) = 0;  ///< the solver starts anew
+  /// Material, gravity and obstacles; the solver starts anew.
+  virtual void write_environment(int environment) = 0;
   virtual void forget_solver(int environment) = 0;
 
   /// Brings the state of a world from the device, unless it is there already.

@@ -156,20 +156,20 @@ struct LiveScene::Storage {
     }
     for (LiveEffector& live : effectors) {
       std::fill(live.forces.begin(), live.forces.end(), 0.0);
-      for (std::size_t w = 0; w < worlds.size(); ++w) {
-        add_rows(worlds[w].hold_forces(), live.numbers[w].hold, live.forces);
-        if (live.numbers[w].obstacle >= 0)
-          add_rows(worlds[w].obstacle_forces(), live.numbers[w].obstacle, live.forces);
-      }
+      for (std::size_t w = 0; w < worlds.size(); ++w)
+        for (const int e : every) {
+          const StepReport& report = worlds[w].report(e);
+          add_force(report.hold_forces, live.numbers[w].hold, e, live.forces);
+          add_force(report.obstacle_forces, live.numbers[w].obstacle, e, live.forces);
+        }
     }
   }
 
-  /// Adds row `row` of each environment, of 3 numbers.
-  void add_rows(const Tensor& all, int row, std::vector<double>& sum) const {
-    const auto* numbers = static_cast<const double*>(all.data);
-    for (std::size_t e = 0; e < every.size(); ++e)
-      for (std::size_t k = 0; k < 3; ++k)
-        sum[3 * e + k] += numbers[3 * (e * static_cast<std::size_t>(all.shape[1]) + row) + k];
+  /// Adds a force to that of environment e. There is none before the first step, nor of what is no obstacle.
+  static void add_force(const std::vector<Eigen::Vector3d>& forces, int number, int e,
+                        std::vector<double>& sum) {
+    if (number < 0 || number >= std::ssize(forces)) return;
+    Eigen::Map<Eigen::Vector3d>(sum.data() + 3 * e) += forces[static_cast<std::size_t>(number)];
   }
 
   bool is_given(const std::vector<Tensor>& given, std::size_t o, std::size_t w) const {
@@ -203,7 +203,7 @@ struct LiveScene::Storage {
   }
 };
 
-LiveScene::LiveScene(const data::Scene& scene, int environments, int threads)
+LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, const DeviceChoice& device)
     : storage_(std::make_unique<Storage>()) {
   if (environments < 1)
     throw InputError("environments: found " + std::to_string(environments) + ", expected 1 or more");
@@ -214,7 +214,7 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads)
   s.quasistatic = scene.rest_motion.has_value();
   s.notices = scene.notices;
   const std::vector<SceneBody> bodies = scene_bodies(scene, scene.steps, s.notices);
-  s.worlds = scene_worlds(scene, bodies, environments, {}, threads, {}, &s.stop);
+  s.worlds = scene_worlds(scene, bodies, environments, {}, threads, device, &s.stop);
   for (std::size_t w = 0; w < bodies.size(); ++w) {
     s.starts.push_back(bodies[w].environment.state);
     const Sheet& sheet = bodies[w].sheet;

@@ -33,8 +33,8 @@ using MaterialNumbers = std::vector<std::pair<std::string, std::vector<double>>>
 class LiveScene {
  public:
   /// `environments` of each object, all alike. Throws data::InputError as load_scene and scene_worlds do.
-  /// `threads`: 0: one a processor.
-  LiveScene(const data::Scene& scene, int environments, int threads);
+  /// `threads`: 0: one a processor. On a CUDA device, the first of those chosen, as Worlds do.
+  LiveScene(const data::Scene& scene, int environments, int threads, const DeviceChoice& device = {});
   ~LiveScene();
 
   int size() const;
@@ -94,7 +94,8 @@ class LiveScene {
   /// Ends a `step` in another thread soon.
   void stop();
 
-  // Views that stay where they are. What is in them is as it was at the end of the last step.
+  // Views that stay where they are, those of positions and velocities where the environments are, and on a
+  // device until an end effector is added. What is in them is as it was at the end of the last step.
   Tensor positions(const std::string& object) const;    ///< environments x vertices x 3 [m]
   Tensor velocities(const std::string& object) const;   ///< environments x vertices x 3 [m/s]
   Tensor force(const std::string& end_effector) const;  ///< it on the objects: environments x 3 [N]

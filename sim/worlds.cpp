@@ -72,10 +72,16 @@ struct Worlds::Storage {
     return view(device ? device->copy_of(numbers) : numbers.data(), std::move(shape));
   }
 
-  void expect_processor(const char* setter) const {
-    if (device)
-      refuse_argument(
-          setter, "found environments on a CUDA device, expected those of the CPU, which alone does that");
+  /// On a device an end effector is an obstacle more, of which that has so many at most.
+  void check_room_on_device(const Environment& environment) const {
+    if (!device) return;
+    Environment with_one_more = environment;
+    with_one_more.obstacles.emplace_back();
+    try {
+      check_on_device({with_one_more}, settings);
+    } catch (const InputError& error) {
+      refuse_argument("add", error.what());
+    }
   }
 
   void expect_hold(const char* setter, int hold) const {
@@ -114,7 +120,7 @@ struct Worlds::Storage {
     }
     for (std::size_t i = 0; i < which.size(); ++i) {
       place(at(which[i]).environment) = materials[i];
-      if (device) device->write_material(which[i]);
+      if (device) device->write_environment(which[i]);
     }
   }
 
@@ -190,7 +196,6 @@ int Worlds::size() const { return storage_->size(); }
 
 EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses) {
   Storage& s = *storage_;
-  s.expect_processor("add");
   check_end_effector(effector);
   const std::vector<Eigen::Isometry3d> at = poses_of("add", s.every, poses);
   const auto frames_of = [](const World& world) { return world.plan ? std::ssize(world.plan->frames) : 0; };
@@ -205,6 +210,7 @@ EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses)
                       environment_name(e) +
                           ": found other numbers of frames or obstacles, expected those of environment 0");
   }
+  if (effector.collides) s.check_room_on_device(s.at(0).environment);
   EndEffectorNumbers numbers{.frame = 0, .hold = static_cast<int>(s.holds++), .obstacle = -1};
   if (effector.collides) numbers.obstacle = static_cast<int>(s.obstacles++);
   std::shared_ptr<const Schedule> before, after;
@@ -223,6 +229,8 @@ EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses)
   }
   s.hold_forces.assign(s.worlds.size() * 3 * static_cast<std::size_t>(s.holds), 0.0);
   s.obstacle_forces.assign(s.worlds.size() * 3 * static_cast<std::size_t>(s.obstacles), 0.0);
+  // What a device has of an environment is as large as its holds and obstacles ask for.
+  if (s.device) s.device = device_worlds(s.plan, s.worlds, s.settings);
   return numbers;
 }
 
@@ -243,18 +251,18 @@ void Worlds::set_poses(const Chosen& environments, int frame, const Tensor& pose
 
 void Worlds::set_gravity(const Chosen& environments, const Tensor& gravity) {
   Storage& s = *storage_;
-  s.expect_processor("set_gravity");
   const std::span<const int> chosen = s.numbers_of("set_gravity", environments);
   const double* numbers = s.entries_of("set_gravity", "gravity", chosen, gravity, {3});
-  for (std::size_t i = 0; i < chosen.size(); ++i)
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
     s.at(chosen[i]).environment.gravity = Eigen::Map<const Eigen::Vector3d>(numbers + 3 * i);
+    if (s.device) s.device->write_environment(chosen[i]);
+  }
 }
 
 void Worlds::set_friction(const Chosen& environments, int obstacle, std::span<const double> friction,
                           int body) {
   Storage& s = *storage_;
   const char* setter = "set_friction";
-  s.expect_processor(setter);
   const std::span<const int> chosen = s.numbers_of(setter, environments);
   if (friction.size() != chosen.size())
     refuse_argument(setter, "found " + std::to_string(friction.size()) + " coefficients, expected " +
@@ -276,6 +284,7 @@ void Worlds::set_friction(const Chosen& environments, int obstacle, std::span<co
         s.at(chosen[i]).environment.obstacles[static_cast<std::size_t>(obstacle)].friction;
     all.resize(std::max(all.size(), static_cast<std::size_t>(body) + 1), -1.0);
     all[static_cast<std::size_t>(body)] = friction[i];
+    if (s.device) s.device->write_environment(chosen[i]);
   }
 }
 

@@ -77,8 +77,10 @@ class Worlds {
   int size() const;
 
   /// Gives every environment an end effector, open, at its pose: environments x 7. The tensors of forces are
-  /// others from then on. Throws data::InputError where a step has been taken, where the environments differ
-  /// in the number of their frames or obstacles, for what is no size, threshold or friction, and on a device.
+  /// others from then on, and all views of a device, which takes the memory of the environments anew before
+  /// it gives back what they had. Throws data::InputError where a step has been taken, where the environments
+  /// differ in the number of their frames or obstacles, for what is no size, threshold or friction, and for
+  /// an obstacle more than a device meets.
   EndEffectorNumbers add(const EndEffector& effector, const Tensor& poses);
 
   /// Where a frame of the schedule is at the end of the next step: environments x 7. It stays there until it
@@ -92,11 +94,10 @@ class Worlds {
   void set_materials(const Chosen& environments, std::span<const data::SolidMaterial> materials,
                      int body = 0);
 
-  /// environments x 3 [m/s^2]. Throws data::InputError, on a device too.
+  /// environments x 3 [m/s^2]. Throws data::InputError.
   void set_gravity(const Chosen& environments, const Tensor& gravity);
 
-  /// Coulomb coefficients of an obstacle on one body, one for each environment. Throws data::InputError, on a
-  /// device too.
+  /// Coulomb coefficients of an obstacle on one body, one for each environment. Throws data::InputError.
   void set_friction(const Chosen& environments, int obstacle, std::span<const double> friction, int body = 0);
 
   /// A hold closes in the next step, on what is where the environment stands then. One that is closed goes on
@@ -125,8 +126,8 @@ class Worlds {
             std::span<const int> positions_at = {});
 
   // Views of numbers where the environments are. They stay where they are as long as the worlds do, those of
-  // forces until an end effector is added. What is in them is as it was at the end of the last `step`. Those
-  // of a device take their memory when they are first asked for.
+  // forces and of a device until an end effector is added. What is in them is as it was at the end of the
+  // last `step`. Those of a device take their memory when they are first asked for.
   Tensor positions() const;        ///< environments x vertices x 3 [m]
   Tensor velocities() const;       ///< environments x vertices x 3 [m/s]
   Tensor hold_forces() const;      ///< hold on sheet: environments x holds x 3 [N]
