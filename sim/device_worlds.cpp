@@ -298,6 +298,7 @@ class Stepper final : public DeviceWorlds {
     for (; taken < count && own.lost == Lost::no; ++taken) {
       const auto row = static_cast<std::size_t>(taken);
       StepReport report = report_of(stats[row]);
+      memory_.tables.note_work(e, stats[row].work());
       report.hold_forces = vectors_of(of_holds + 3 * row * holds, holds);
       report.obstacle_forces = vectors_of(
           of_obstacles + 3 * row * static_cast<std::size_t>(memory_.most_obstacles_each), obstacles);

@@ -56,11 +56,6 @@ __device__ Work& begin_work(CommonState& common, int e) {
   });
 }
 
-/// What a step took, in solves, about: by the parts of steps of 1,024 vertices on one processor.
-__device__ int work_of(const ReplayStats& stats) {
-  return stats.solves + 2 * stats.iterations + 8 * stats.factorizations;
-}
-
 /// Where an environment starts: with what its solver had at the end of the step before, or anew.
 __device__ void begin_solver(Work& w, StepProblem& step, const SolverState& kept, int first,
                              const Point* positions) {
@@ -141,7 +136,7 @@ __device__ int advance(CommonState& common, int e, int first, int end) {
       step.restrictions.count = step.held_count = motion.held_count;
     });
     const ReplayStats stats = advance_step(w, step, motion, state);
-    work += work_of(stats);
+    work += stats.work();
     lost = loses(replay, stats);
     if (team_rank() == 0) replay.stats[stats_row] = stats;
     const int kept = replay.kept_count > 0 ? replay.kept_index[at - replay.kept_begin] : -1;

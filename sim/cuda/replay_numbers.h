@@ -72,6 +72,9 @@ struct ReplayStats {
   double kinetic, membrane, bending;  ///< energies at the end [J]
   int iterations, solves, factorizations, substeps;
   int converged;
+
+  /// What it took, in solves, about: by the parts of steps of 1,024 vertices on one processor.
+  __host__ __device__ int work() const { return solves + 2 * iterations + 8 * factorizations; }
 };
 
 /// Directions that the generalized minimal residual method keeps, all of them.
@@ -140,6 +143,7 @@ struct SolverState {
 struct WaitingEnvironments {
   int* steps;                ///< where each of them stands; -1: a team works on it, or it is at its end
   int* work;                 ///< that each took since its `begins`, in solves
+  const float* expected;     ///< work of a step of each, by its last ones
   int* unfinished;           ///< how many are not at their end
   const int *begins, *ends;  ///< steps of each
   int count;

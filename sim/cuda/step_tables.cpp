@@ -5,6 +5,11 @@
 #include "sim/cuda/device_arena.h"
 
 namespace flash::sim::cuda {
+namespace {
+
+constexpr float usual_work = 27;  // of a step, in solves, where nothing is known
+
+}  // namespace
 
 int StepPlan::most_steps() const {
   int most = 0;
@@ -16,13 +21,15 @@ StepTables::StepTables(int environments, int vertices, int holds, int obstacles)
     : environments_(static_cast<std::size_t>(environments)),
       vertices_(static_cast<std::size_t>(vertices)),
       holds_(static_cast<std::size_t>(holds)),
-      obstacles_(static_cast<std::size_t>(obstacles)) {}
+      obstacles_(static_cast<std::size_t>(obstacles)),
+      expected_(environments_, usual_work) {}
 
 StepTables::Places StepTables::lay_out(char* begin) const {
   DeviceArena arena(begin);
   Places places{};
   for (int** each : {&places.begins, &places.ends, &places.steps, &places.work})
     *each = arena.take<int>(environments_);
+  places.expected = arena.take<float>(environments_);
   places.unfinished = arena.take<int>(1);
   places.queue_bytes = arena.used();
   places.motions = arena.take<int>(environments_);
@@ -81,6 +88,7 @@ void StepTables::open(const StepPlan& plan, cudaStream_t stream) {
   const Places to = lay_out(tables_.data());
   std::copy(plan.begins.begin(), plan.begins.end(), to.begins);
   std::copy(plan.ends.begin(), plan.ends.end(), to.ends);
+  std::copy(expected_.begin(), expected_.end(), to.expected);
   *to.unfinished = 0;
   for (std::size_t e = 0; e < environments_; ++e) {
     const bool steps = plan.begins[e] < plan.ends[e];
@@ -111,11 +119,18 @@ void StepTables::queue(int begin, int end, cudaStream_t stream) {
   copy_to_device(to.queue_bytes, stream);
 }
 
+void StepTables::note_work(int environment, int work) {
+  constexpr float newest = 0.3F;  // the last three steps have two thirds of the weight
+  float& expected = expected_[static_cast<std::size_t>(environment)];
+  expected += newest * (static_cast<float>(work) - expected);
+}
+
 void StepTables::put(ReplayNumbers& numbers) const {
   const Places at = lay_out(device_tables_.data());
   const Results results = lay_out_results(device_results_.data());
   numbers.waiting.steps = at.steps;
   numbers.waiting.work = at.work;
+  numbers.waiting.expected = at.expected;
   numbers.waiting.unfinished = at.unfinished;
   numbers.waiting.begins = at.begins;
   numbers.waiting.ends = at.ends;

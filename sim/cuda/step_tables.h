@@ -35,6 +35,10 @@ class StepTables {
   /// Queues steps of an open plan again, from `begin` up to `end` of all environments.
   void queue(int begin, int end, cudaStream_t stream);
 
+  /// Notes the work of a step that an environment has taken. Those that took most in their last steps are
+  /// taken up first in the next ones, so that none of them is left to the end.
+  void note_work(int environment, int work);
+
   /// Sets what kernels have of an open plan.
   void put(ReplayNumbers& numbers) const;
 
@@ -52,6 +56,7 @@ class StepTables {
  private:
   struct Places {
     int *begins, *ends, *steps, *work, *unfinished, *motions, *hold_starts, *spring_starts, *kept_index;
+    float* expected;
     HeldPlace* holds;
     SpringPlace* springs;
     FramePose* poses;
@@ -68,6 +73,7 @@ class StepTables {
   void copy_to_device(std::size_t bytes, cudaStream_t stream);
 
   std::size_t environments_, vertices_, holds_, obstacles_;
+  std::vector<float> expected_;  ///< work of a step of each environment
   // Of the open plan.
   std::size_t steps_ = 0, motions_ = 0, held_ = 0, springs_ = 0, kept_ = 0, kept_index_ = 0;
   int frames_ = 0, kept_begin_ = 0;

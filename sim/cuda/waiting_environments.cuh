@@ -5,12 +5,12 @@
 namespace flash::sim::cuda {
 
 /// What an environment at step `at` is expected to need still, in solves: as much a step as so far, and as if
-/// it had taken a few usual steps before the first one.
+/// it had taken a few expected steps before the first one.
 __device__ inline float remaining_work(const WaitingEnvironments& waiting, int environment, int at) {
-  constexpr float usual_steps = 10, usual_work = 27;
+  constexpr float steps_before = 10;
   const float done = static_cast<float>(static_cast<const volatile int*>(waiting.work)[environment]);
-  return (done + usual_steps * usual_work) /
-         (static_cast<float>(at - waiting.begins[environment]) + usual_steps) *
+  return (done + steps_before * waiting.expected[environment]) /
+         (static_cast<float>(at - waiting.begins[environment]) + steps_before) *
          static_cast<float>(waiting.ends[environment] - at);
 }
 
