@@ -4,16 +4,16 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from flash_sim.tasks import TowelTask
+from flash_sim.tasks import FoldTask
 
 
-class TowelVectorEnv(VectorEnv):
-    """TowelTask. An episode that ends is followed by the next one's start in the same step (SAME_STEP): infos["final_obs"] has
+class FoldVectorEnv(VectorEnv):
+    """FoldTask. An episode that ends is followed by the next one's start in the same step (SAME_STEP): infos["final_obs"] has
     the last observations where infos["_final_obs"] is true. With autoreset=False (DISABLED) reset(options={"reset_mask":
     mask}) starts anew."""
 
     def __init__(self, num_envs, settings=None, threads=0, autoreset=True):
-        self.task = TowelTask(num_envs, settings, threads)
+        self.task = FoldTask(num_envs, settings, threads)
         self.num_envs = num_envs
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP if autoreset else AutoresetMode.DISABLED}
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.task.observations,), np.float64)

@@ -6,17 +6,17 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from flash_sim.tasks import TowelTask
+from flash_sim.tasks import FoldTask
 
 
-class TowelVecEnv(VecEnv):
-    """TowelTask, with its observations in the group "policy". An episode that ends is followed by the next one's start in the
+class FoldVecEnv(VecEnv):
+    """FoldTask, with its observations in the group "policy". An episode that ends is followed by the next one's start in the
     same step; extras["time_outs"] says which ended for want of time."""
 
     def __init__(self, num_envs, settings=None, threads=0, device="cpu"):
-        self.task = TowelTask(num_envs, settings, threads)
+        self.task = FoldTask(num_envs, settings, threads)
         self.num_envs, self.num_actions, self.device = num_envs, self.task.actions, device
-        self.max_episode_length = self.task.settings.time_limit
+        self.max_episode_length = self.task.time_limit
         self.cfg = dataclasses.asdict(self.task.settings)
 
     @property

@@ -1,113 +1,167 @@
 """Tasks for policies: what is seen, what is done, what is asked. No library of reinforcement learning is needed."""
 import dataclasses
-import pathlib
 
 import numpy as np
 
+from flash_sim.folds import FOLDS, Fold
 from flash_sim.realtime_sim import RealtimeSim
 
-HAND = "hand"
-ON_TABLE = 0.001  # height at which the towel starts: half of its thickness [m]
+HOME = 0.15   # height of a hand at the start [m]
+TOUCH = 0.012  # of a hand above the table, at least: half of its size, and the cloth [m]
 
 
 @dataclasses.dataclass
-class TowelSettings:
-    scene: str = str(pathlib.Path(__file__).parent / "scenes" / "towel.json")  # of one square sheet in the plane z = 0
+class FoldSettings:
+    fold: str | Fold = "towel"    # one of FOLDS, or one's own
     randomization: str = "none"   # of materials at each reset, as RealtimeSim.randomize has it
     steps_per_action: int = 4     # of the simulation
-    time_limit: int = 200         # actions
-    speed: float = 0.4            # of the hand at an action of 1 along each axis [m/s]
-    near: float = 0.05            # from the corner across, where a fold is a success [m]
-    still: float = 0.1            # of the corner then, at most [m/s]
-    shift: float = 0.05           # of the towel at the start, in both directions along x and y [m]
-    turn: float = 0.5             # of the towel at the start, both ways [rad]
+    time_limit: int = 200         # actions per stage
+    speed: float = 0.4            # of a hand at an action of 1 along each axis [m/s]
+    near: float = 0.05            # from where it is to lie, where what was carried is there [m]
+    still: float = 0.1            # of it then, at most [m/s]
+    shift: float = 0.05           # of the cloth at the start, in both directions along x and y [m]
+    turn: float = 0.5             # of the cloth at the start, both ways [rad]
     seed: int = 0
 
 
-class TowelTask:
-    """A towel with one arm: its corner of the smallest x and largest y (left-top) is to lie on the one across.
+class FoldTask:
+    """A cloth is folded by stages: each hand of a stage is to lay one place of the cloth on another one, and to let go.
 
-    Actions (n, 4): motion of the hand along x, y and z in [-1, 1], times the speed; above 0 it closes, else it opens.
-    Observations (n, 14) float64: hand, corner minus hand, goal minus corner [m]; velocity of the corner [m/s]; whether the hand
-    is closed, whether it carries anything. A success is a corner that lies within `near` of the goal, let go and at rest.
+    Actions (n, 4 per hand): motion along x, y and z in [-1, 1], times the speed; above 0 a hand closes, else it opens.
+    Observations (n, 14 per hand, and 1 per stage where there are several) float64, of each hand: its place, where it is to take
+    minus its place, where it is to lay minus where it is to take [m]; velocity of what it is to take [m/s]; whether it is closed,
+    whether it carries anything. A hand that a stage does not need sees zeros there. Then which stage it is. A stage is done when
+    all it carries lies within `near` of where it is to lie, let go and at rest, and the last one is the success.
     """
 
-    actions, observations = 4, 14
-
     def __init__(self, n_envs, settings=None, threads=0):
-        self.settings = settings or TowelSettings()
+        self.settings = settings or FoldSettings()
         self.n_envs = n_envs
+        self.fold = _fold(self.settings.fold)
         self.sim = RealtimeSim(threads=threads, seed=self.settings.seed)
-        self.sim.load_config(self.settings.scene)
+        self.sim.load_config(self.fold.scene)
         self.sim.set_envs(n_envs)
         self.sim.initialize()
-        # A fingertip that is open: what it should take lies below it.
-        self.sim.add_ee(HAND, [0, 0, 0.15], size=[0.02, 0.02, 0.02], reach=0.006, collides=False)
-        self._x, self._v, self._hand = self.sim.positions(), self.sim.velocities(), self.sim.pose(HAND)
+        self.hands, self.stages = self.fold.hands, len(self.fold.stages)
+        self._x, self._v = self.sim.positions(), self.sim.velocities()
         self._flat = np.array(self._x[0])
-        along = self._flat[:, 0] - self._flat[:, 1]
-        self._corner, self._goal = int(np.argmin(along)), int(np.argmax(along))
+        # By stage and hand, -1 where a hand has nothing to do.
+        self._take = np.full((self.stages, len(self.hands)), -1)
+        self._lay = np.full_like(self._take, -1)
+        for s, stage in enumerate(self.fold.stages):
+            for carry in stage:
+                h = self.hands.index(carry.hand)
+                self._take[s, h], self._lay[s, h] = self._vertex(carry.take), self._vertex(carry.lay)
+        for hand, home in zip(self.hands, self._homes()):
+            # A fingertip that is open: what it should take lies below it.
+            self.sim.add_ee(hand, home, size=[0.02, 0.02, 0.02], reach=0.006, collides=False)
+        self._poses = [self.sim.pose(hand) for hand in self.hands]
+        self.actions = 4 * len(self.hands)
+        self.observations = 14 * len(self.hands) + (self.stages if self.stages > 1 else 0)
+        self.time_limit = self.settings.time_limit * self.stages  # actions
         self._random = np.random.default_rng(self.settings.seed)
         self.lengths = np.zeros(n_envs, int)  # actions of the episodes at hand
-        self.closed = np.zeros(n_envs, bool)
+        self.stage = np.zeros(n_envs, int)
+        self.closed = np.zeros((n_envs, len(self.hands)), bool)
         self.reset()
 
-    @property
-    def hand(self):
-        """(n, 3) [m]"""
-        return self._hand[:, :3]
+    # Arrays by hand, (n, hands, ...).
 
     @property
-    def corner(self):
-        """Where the corner that is to be carried is, (n, 3) [m]."""
-        return self._x[:, self._corner]
+    def place(self):
+        """Of the hands [m]."""
+        return np.stack([pose[:, :3] for pose in self._poses], axis=1)
 
     @property
-    def goal(self):
-        """Where the corner across is, (n, 3) [m]."""
-        return self._x[:, self._goal]
+    def works(self):
+        """Whether a hand has something to carry in the stage at hand."""
+        return self._take[self.stage] >= 0
+
+    @property
+    def take(self):
+        """Where the cloth that is to be carried is [m]."""
+        return self._at(self._x, self._take)
+
+    @property
+    def lay(self):
+        """Where the cloth on which it is to lie is [m]."""
+        return self._at(self._x, self._lay)
+
+    @property
+    def carries(self):
+        return np.stack([self.sim.held(hand) > 0 for hand in self.hands], axis=1)
 
     def reset(self, env_ids=None, seed=None):
-        """New episodes: the towel lies flat, shifted and turned at random. Returns the observations of all."""
+        """New episodes: the cloth lies flat, shifted and turned at random. Returns the observations of all."""
         if seed is not None:
             self._random = np.random.default_rng(seed)
         ids = np.arange(self.n_envs) if env_ids is None else np.asarray(env_ids, int)
         if len(ids):
             self.sim.reset(ids, positions=np.stack([self._placed() for _ in ids]))
             self.sim.randomize(self.settings.randomization, seed=int(self._random.integers(2**31)), env_ids=ids)
-            self.lengths[ids] = 0
+            self.lengths[ids] = self.stage[ids] = 0
             self.closed[ids] = False
         return self.observe()
 
     def observe(self):
-        return np.concatenate([self.hand, self.corner - self.hand, self.goal - self.corner, self._v[:, self._corner],
-                               self.closed[:, None], self.sim.held(HAND)[:, None] > 0], axis=1)
+        take, works = self.take, self.works[:, :, None]
+        of_hands = np.concatenate([
+            self.place, (take - self.place) * works, (self.lay - take) * works, self._at(self._v, self._take) * works,
+            self.closed[:, :, None], self.carries[:, :, None]], axis=2).reshape(self.n_envs, -1)
+        return of_hands if self.stages == 1 else np.concatenate([of_hands, np.eye(self.stages)[self.stage]], axis=1)
 
     def step(self, actions):
         """Returns observations, rewards, success, time_out, of the same episodes: who resets them calls reset.
 
-        Rewards are minus the distance of hand and corner, where it is not carried, minus that of corner and goal [m], and 10
-        for a success. An environment that is lost ends as one whose time is up.
+        Rewards are minus the distance of a hand from what it is to take, where it does not carry, minus that of this from where
+        it is to lie [m], over all hands that work, and 10 for a stage that is done. An environment that is lost ends as one
+        whose time is up.
         """
         actions = np.clip(np.asarray(actions, np.float64), -1, 1)
         if actions.shape != (self.n_envs, self.actions) or not np.isfinite(actions).all():
             raise ValueError(f"actions: found the shape {actions.shape}, expected finite ({self.n_envs}, {self.actions})")
-        self.closed = actions[:, 3] > 0
-        self.sim.grasp_ee(HAND, self.closed)
-        way = actions[:, :3] * self.settings.speed * self.sim.time_step
+        by_hand = actions.reshape(self.n_envs, -1, 4)
+        self.closed = by_hand[:, :, 3] > 0
+        way = by_hand[:, :, :3] * self.settings.speed * self.sim.time_step
+        for h, hand in enumerate(self.hands):
+            self.sim.grasp_ee(hand, self.closed[:, h])
         for _ in range(self.settings.steps_per_action):
-            place = self.hand + way
-            place[:, 2] = np.maximum(place[:, 2], 0.012)  # above the table by half its size and the towel
-            self.sim.move_ee(HAND, place)
+            for h, hand in enumerate(self.hands):
+                place = self._poses[h][:, :3] + way[:, h]
+                place[:, 2] = np.maximum(place[:, 2], TOUCH)
+                self.sim.move_ee(hand, place)
             self.sim.step()
         self.lengths += 1
-        off_goal = np.linalg.norm(self.goal - self.corner, axis=1)
-        off_hand = np.linalg.norm(self.corner - self.hand, axis=1) * (self.sim.held(HAND) == 0)
-        still = np.linalg.norm(self._v[:, self._corner], axis=1) < self.settings.still
-        success = (self.sim.held(HAND) == 0) & still & (off_goal < self.settings.near)
+        return self._judged()
+
+    def _judged(self):
+        works, carries, take = self.works, self.carries, self.take
+        off_goal = np.linalg.norm(self.lay - take, axis=2) * works
+        off_hand = np.linalg.norm(take - self.place, axis=2) * (works & ~carries)
+        still = np.linalg.norm(self._at(self._v, self._take), axis=2) * works < self.settings.still
         lost = self.sim.status()["lost"] != 0
-        rewards = -np.nan_to_num(off_goal + off_hand, nan=1.0) + 10.0 * success
-        return self.observe(), rewards, success & ~lost, lost | (self.lengths >= self.settings.time_limit) & ~success
+        done = (still & (off_goal < self.settings.near)).all(axis=1) & ~carries.any(axis=1) & ~lost
+        rewards = -np.nan_to_num((off_goal + off_hand).sum(axis=1), nan=1.0) + 10.0 * done
+        success = done & (self.stage == self.stages - 1)
+        self.stage[done & ~success] += 1
+        time_out = lost | (self.lengths >= self.time_limit) & ~success
+        return self.observe(), rewards, success, time_out
+
+    def _at(self, of_vertices, table):
+        """Rows of the vertices that a table has for the stage of each environment, (n, hands, 3)."""
+        return of_vertices[np.arange(self.n_envs)[:, None], table[self.stage]]
+
+    def _vertex(self, share):
+        low, high = self._flat.min(axis=0), self._flat.max(axis=0)
+        off = np.linalg.norm((self._flat - low - np.asarray([*share, 0]) * (high - low))[:, :2], axis=1)
+        nearest = np.flatnonzero(off < off.min() + 1e-6)
+        return int(nearest[np.argmax(self._flat[nearest, 2])])
+
+    def _homes(self):
+        """Of each hand: above the middle of the cloth, side by side [m]."""
+        middle = 0.5 * (self._flat.min(axis=0) + self._flat.max(axis=0))
+        aside = 0.1 * (np.arange(len(self.hands)) - 0.5 * (len(self.hands) - 1))
+        return [[middle[0] + x, middle[1], HOME] for x in aside]
 
     def _placed(self):
         turn, shift = self.settings.turn, self.settings.shift
@@ -118,51 +172,68 @@ class TowelTask:
         return rotated + centre + [*self._random.uniform(-shift, shift, 2), 0]
 
 
+def _fold(fold):
+    if isinstance(fold, Fold):
+        return fold
+    if fold not in FOLDS:
+        raise ValueError(f"fold: found {fold!r}, expected one of {', '.join(FOLDS)}, or a Fold")
+    return FOLDS[fold]
+
+
 APPROACH, GRASP, TRANSPORT = range(3)
 
 
-class TowelTeacher:
-    """The scripted policy: Approach (above the corner), Grasp (down, close), Transport (over in an arc, down, open). What
-    drops the corner approaches again."""
+class FoldTeacher:
+    """The scripted policy of the stages: Approach (above what is to be taken), Grasp (down, close; wait for the other hands),
+    Transport (over in an arc, down, open). Hands that drop something approach again, and so do those beside them."""
 
-    hover = 0.05        # above the corner [m]
-    horizontal = 0.01   # from the corner, from where on the hand goes down [m]
-    grip = 0.0145       # of the hand above the corner when it closes [m]
+    hover = 0.05        # above what is to be taken [m]
+    horizontal = 0.01   # from it, from where on a hand goes down [m]
+    grip = 0.0145       # of a hand above it when it closes [m]
     arc = 0.8, 0.15     # height of the way over: times what is left of it, and at most [m]; lower, the fold drags on the rest
-    carry = 0.6         # speed with the corner, as a share of the hand's
-    put = 0.02          # from the goal, where it opens [m]
+    carry = 0.6         # speed with it, as a share of the hand's
+    put = 0.02          # from where it is to lie, where a hand opens [m]
 
-    def __init__(self, n_envs):
-        self.stage = np.full(n_envs, APPROACH)
-        self.put_at = np.zeros((n_envs, 3))  # where the goal was when the corner was taken: it must not be chased [m]
+    def __init__(self, task):
+        shape = task.n_envs, len(task.hands)
+        self.state = np.full(shape, APPROACH)
+        self.stage = np.array(task.stage)
+        self.put_at = np.zeros((*shape, 3))  # where that was when the cloth was taken: it must not be chased [m]
 
     def reset(self, env_ids):
-        self.stage[env_ids] = APPROACH
+        self.state[env_ids] = APPROACH
 
     def act(self, task):
-        hand, corner, goal = task.hand, task.corner, task.goal
-        carries = task.sim.held(HAND) > 0
-        self.stage[(self.stage == TRANSPORT) & ~carries] = APPROACH
-        above = np.linalg.norm((corner - hand)[:, :2], axis=1) < self.horizontal
-        self.stage[(self.stage == APPROACH) & above] = GRASP
-        self.stage[(self.stage == GRASP) & ~above & ~carries] = APPROACH
-        taken = (self.stage == GRASP) & carries
-        self.put_at[taken] = goal[taken]
-        self.stage[taken] = TRANSPORT
+        place, take, lay, carries, works = task.place, task.take, task.lay, task.carries, task.works
+        new = task.stage != self.stage
+        self.stage[:] = task.stage
+        dropped = ((self.state == TRANSPORT) & works & ~carries).any(axis=1)
+        self.state[new | dropped] = APPROACH
+        above = np.linalg.norm((take - place)[:, :, :2], axis=2) < self.horizontal
+        self.state[(self.state == APPROACH) & above] = GRASP
+        self.state[(self.state == GRASP) & ~above & ~carries] = APPROACH
+        taken = ((self.state == GRASP) & carries | ~works).all(axis=1)
+        self.put_at[taken] = lay[taken]
+        self.state[taken] = TRANSPORT
 
-        approach, grasp, transport = (self.stage == s for s in (APPROACH, GRASP, TRANSPORT))
-        left = np.linalg.norm((self.put_at - corner)[:, :2], axis=1)
-        at = np.where(grasp[:, None], corner + [0, 0, self.grip], corner + [0, 0, self.hover])
-        arc = self.put_at + (hand - corner) * [1, 1, 0]  # the hand keeps its place over the corner
-        arc[:, 2] += self.grip + 0.004 + np.minimum(self.arc[0] * left, self.arc[1])
-        at = np.where(transport[:, None], arc, at)
-        low = hand[:, 2] - corner[:, 2] < self.grip + 0.003
-        close = grasp & low | transport & ~((left < self.put) & (hand[:, 2] < 0.04))
-        step = task.settings.speed * task.settings.steps_per_action * task.sim.time_step
-        way = (at - hand) / step
-        way[:, :2] /= np.maximum(1, np.abs(way[:, :2]).max(axis=1, keepdims=True))
-        way[:, 2] = np.clip(way[:, 2], -1, 1)
+        approach, grasp, transport = (self.state == s for s in (APPROACH, GRASP, TRANSPORT))
+        left = np.linalg.norm((self.put_at - take)[:, :, :2], axis=2)
+        at = take + [0, 0, self.hover]
+        at[grasp] = take[grasp] + [0, 0, self.grip]
+        arc = self.put_at + (place - take) * [1, 1, 0]  # a hand keeps its place over what it carries
+        arc[:, :, 2] += self.grip + 0.004 + np.minimum(self.arc[0] * left, self.arc[1])
+        at[transport] = arc[transport]
+        at[~works] = place[~works] * [1, 1, 0] + [0, 0, HOME]
+        low = place[:, :, 2] - take[:, :, 2] < self.grip + 0.003
+        # All hands let go together.
+        there = ((left < self.put) & (place[:, :, 2] < 0.04) | ~works).all(axis=1)[:, None]
+        close = works & (grasp & (low | carries) | transport & ~there)
+        way = (at - place) / (task.settings.speed * task.settings.steps_per_action * task.sim.time_step)
+        way[:, :, :2] /= np.maximum(1, np.abs(way[:, :, :2]).max(axis=2, keepdims=True))
+        way[:, :, 2] = np.clip(way[:, :, 2], -1, 1)
         way[transport] *= self.carry
-        # Up before over: the corner is not dragged along the table.
-        way[:, :2] *= np.where(transport & (arc[:, 2] - hand[:, 2] > 0.02), 0.3, 1)[:, None]
-        return np.concatenate([way, np.where(close, 1.0, -1.0)[:, None]], axis=1)
+        # Up before over: what is carried is not dragged along the table.
+        way[:, :, :2] *= np.where(transport & (arc[:, :, 2] - place[:, :, 2] > 0.02), 0.3, 1)[:, :, None]
+        # A hand that carries waits for the others.
+        way[grasp & carries] = 0
+        return np.concatenate([way, np.where(close, 1.0, -1.0)[:, :, None]], axis=2).reshape(task.n_envs, -1)

@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
-from flash_sim import tasks
-from flash_sim.tasks import TowelSettings, TowelTask, TowelTeacher
+from flash_sim import folds, tasks
+from flash_sim.tasks import FoldSettings, FoldTask, FoldTeacher
 
 SHORT = {"steps_per_action": 1, "time_limit": 3}
 
@@ -11,7 +11,7 @@ SHORT = {"steps_per_action": 1, "time_limit": 3}
 def fold(task, teacher, disturb=lambda step, actions: None):
     """Whether each environment was folded, within the time limit."""
     folded = np.zeros(task.n_envs, bool)
-    for step in range(task.settings.time_limit):
+    for step in range(task.time_limit):
         actions = teacher.act(task)
         disturb(step, actions)
         folded |= task.step(actions)[2]
@@ -21,20 +21,52 @@ def fold(task, teacher, disturb=lambda step, actions: None):
 
 
 def test_the_teacher_folds_the_towel_from_random_starts_and_materials():
-    task = TowelTask(8, TowelSettings(randomization="published", seed=5))
-    starts = np.array(task.corner)
+    task = FoldTask(8, FoldSettings(randomization="published", seed=5))
+    starts = task.take[:, 0]
     assert np.ptp(starts, axis=0)[:2].min() > 0.05  # they differ
-    assert fold(task, TowelTeacher(8)).all()
-    assert np.linalg.norm(task.corner - task.goal, axis=1).max() < 0.06
-    assert np.linalg.norm(task.corner - starts, axis=1).min() > 0.2
+    assert fold(task, FoldTeacher(task)).all()
+    assert np.linalg.norm(task.take - task.lay, axis=2).max() < 0.06
+    assert np.linalg.norm(task.take[:, 0] - starts, axis=1).min() > 0.2
+
+
+def test_two_hands_carry_together():
+    task = FoldTask(4, FoldSettings("towel_two_arms", randomization="published", seed=3))
+    assert task.actions == 8 and task.observe().shape == (4, 28)
+    heights = []
+
+    def watch(step, actions):
+        if task.carries.all():
+            heights.append(task.take[:, :, 2].copy())
+
+    assert fold(task, FoldTeacher(task), watch).all()
+    assert np.abs(np.diff(heights, axis=2)).max() < 0.03  # of the corners, all the way
+    assert np.max(heights) > 0.08
+
+
+def test_stages_follow_each_other():
+    corners = {"a": (0, 1), "b": (1, 1)}
+    there_and_back = folds.Fold(folds.FOLDS["towel"].scene, tuple(
+        (folds.Carry(hand, corner, (corner[0], 0)),) for hand, corner in corners.items()))
+    task = FoldTask(2, FoldSettings(there_and_back, seed=4))
+    assert task.observe().shape == (2, 30) and task.works.tolist() == [[True, False]] * 2
+    assert (task.observe()[:, 17:26] == 0).all()  # of the hand that waits
+    seen = []
+    assert fold(task, FoldTeacher(task), lambda step, actions: seen.append(task.observe()[:, -2:])).all()
+    assert (seen[0] == [1, 0]).all() and (seen[-1] == [0, 1]).all(axis=1).any()
+
+
+def test_unknown_folds_are_refused():
+    with pytest.raises(ValueError, match="fold: found 'sock', expected one of towel, towel_two_arms, tshirt"):
+        FoldTask(1, FoldSettings("sock"))
 
 
 def test_what_drops_the_corner_takes_it_again():
-    task, teacher = TowelTask(2, TowelSettings(seed=1)), TowelTeacher(2)
+    task = FoldTask(2, FoldSettings(seed=1))
+    teacher = FoldTeacher(task)
     dropped = []
 
     def disturb(step, actions):
-        if not dropped and (teacher.stage == tasks.TRANSPORT).all() and (task.corner[:, 2] > 0.08).all():
+        if not dropped and (teacher.state == tasks.TRANSPORT).all() and (task.take[:, 0, 2] > 0.08).all():
             dropped.append(step)
             actions[0, 3] = -1
 
@@ -44,7 +76,7 @@ def test_what_drops_the_corner_takes_it_again():
 def test_the_same_seed_is_the_same_episode():
     runs = []
     for _ in range(2):
-        task = TowelTask(3, TowelSettings(randomization="published", seed=2, **SHORT))
+        task = FoldTask(3, FoldSettings(randomization="published", seed=2, **SHORT))
         runs.append([task.step(np.full((3, 4), 0.3))[0] for _ in range(3)])
     assert np.array_equal(*runs)
     first = task.reset(seed=7)
@@ -54,7 +86,7 @@ def test_the_same_seed_is_the_same_episode():
 
 
 def test_bad_actions_are_refused():
-    task = TowelTask(2, TowelSettings(**SHORT))
+    task = FoldTask(2, FoldSettings(**SHORT))
     for actions in (np.zeros((2, 3)), np.full((2, 4), np.nan), np.zeros(4)):
         with pytest.raises(ValueError, match="actions: found"):
             task.step(actions)
@@ -62,8 +94,8 @@ def test_bad_actions_are_refused():
 
 def test_gymnasium_sees_the_end_of_an_episode_and_the_start_of_the_next():
     gymnasium = pytest.importorskip("gymnasium")
-    from flash_sim.gym import TowelVectorEnv
-    env = TowelVectorEnv(3, TowelSettings(**SHORT))
+    from flash_sim.gym import FoldVectorEnv
+    env = FoldVectorEnv(3, FoldSettings(**SHORT))
     assert env.metadata["autoreset_mode"] == gymnasium.vector.AutoresetMode.SAME_STEP
     observations, infos = env.reset(seed=3)
     assert env.observation_space.contains(observations) and infos == {}
@@ -83,8 +115,8 @@ def test_gymnasium_sees_the_end_of_an_episode_and_the_start_of_the_next():
 
 def test_gymnasium_may_reset_itself():
     pytest.importorskip("gymnasium")
-    from flash_sim.gym import TowelVectorEnv
-    env = TowelVectorEnv(2, TowelSettings(**SHORT), autoreset=False)
+    from flash_sim.gym import FoldVectorEnv
+    env = FoldVectorEnv(2, FoldSettings(**SHORT), autoreset=False)
     for _ in range(3):
         *_, truncated, infos = env.step(np.zeros((2, 4)))
     assert truncated.all() and "final_obs" not in infos
@@ -96,8 +128,8 @@ def test_rsl_rl_trains_on_it():
     """Two rounds of PPO: the interface is what its runner asks for."""
     torch = pytest.importorskip("torch")
     runners = pytest.importorskip("rsl_rl.runners")
-    from flash_sim.rsl import TowelVecEnv
-    env = TowelVecEnv(2, TowelSettings(**SHORT))
+    from flash_sim.rsl import FoldVecEnv
+    env = FoldVecEnv(2, FoldSettings(**SHORT))
     observations = env.get_observations()
     assert observations["policy"].shape == (2, 14) and observations["policy"].dtype == torch.float32
     env.episode_length_buf = torch.tensor([2, 0])
