@@ -68,7 +68,8 @@ __device__ inline void predict(const Work& w, const StepProblem& step, const Ste
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
       const double from = w.memory.hold_starts[3 * k + axis], to = held.target[axis];
-      if (held.axes >> axis & 1) *places[axis] = share == 1 ? to : from + share * (to - from);
+      const double way = to - from + (1 - share) * held.bow[axis];
+      if (held.axes >> axis & 1) *places[axis] = share == 1 ? to : from + share * way;
     }
   }
   const Springs& springs = step.springs;

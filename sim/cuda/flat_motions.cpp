@@ -38,7 +38,8 @@ int FlatMotions::add(const Motion& motion, double time_step, int steps, const st
       holds.push_back({position[held.vertex],
                        int{held.axes[0]} | 2 * int{held.axes[1]} | 4 * int{held.axes[2]},
                        {held.target.x(), held.target.y(), held.target.z()},
-                       {held.holds[0], held.holds[1], held.holds[2]}});
+                       {held.holds[0], held.holds[1], held.holds[2]},
+                       {held.bow.x(), held.bow.y(), held.bow.z()}});
     }
     most = std::max(most, static_cast<int>(holds.size()) - starts.back());
   }
@@ -52,7 +53,8 @@ int FlatMotions::add(const Motion& motion, double time_step, int steps, const st
                          spring.hold,
                          spring.entry,
                          {spring.from.x(), spring.from.y(), spring.from.z()},
-                         {spring.to.x(), spring.to.y(), spring.to.z()}});
+                         {spring.to.x(), spring.to.y(), spring.to.z()},
+                         {spring.bow.x(), spring.bow.y(), spring.bow.z()}});
     std::stable_sort(springs.begin() + spring_starts.back(), springs.end(),
                      [](const SpringPlace& a, const SpringPlace& b) { return a.place < b.place; });
   }

@@ -41,6 +41,22 @@ std::vector<HeldVertex> held_at(const Environment& environment, double time) {
   return all;
 }
 
+/// Of places at the start, in the middle and at the end of a step (HeldVertex).
+Eigen::Vector3d bow_of(const Eigen::Vector3d& start, const Eigen::Vector3d& middle,
+                       const Eigen::Vector3d& end) {
+  return 4 * middle - 2 * (start + end);
+}
+
+/// The vertices held over a step, by which the holds have changed already.
+std::vector<HeldVertex> held_over(const Environment& environment, double start, double end) {
+  std::vector<HeldVertex> held = held_at(environment, end);
+  const std::vector<HeldVertex> before = held_at(environment, start),
+                                between = held_at(environment, 0.5 * (start + end));
+  for (std::size_t k = 0; k < held.size(); ++k)
+    held[k].bow = bow_of(before[k].target, between[k].target, held[k].target);
+  return held;
+}
+
 /// Where the stiffness of each hold begins among those of an environment.
 std::vector<int> first_entries(const Environment& environment) {
   std::vector<int> first = {0};
@@ -91,7 +107,7 @@ HoldMotion motion_of_holds(Environment& environment, double time_step, int steps
   for (int k = 0; k < steps; ++k) {
     const double time = environment.state.time + time_step;
     update_holds(environment, time);
-    motion.push_back(held_at(environment, time));
+    motion.push_back(held_over(environment, environment.state.time, time));
     environment.state.time = time;
   }
   environment.state.time = start;
@@ -106,13 +122,18 @@ std::shared_ptr<const SpringMotions> motion_of_springs(Environment environment, 
     const double time = environment.state.time + time_step;
     update_holds(environment, time);
     std::vector<SpringMotion>& step = motion->emplace_back();
-    for (const Spring& spring : springs_of(environment, time))
+    const std::vector<Spring> springs = springs_of(environment, time),
+                              between = springs_of(environment, time - 0.5 * time_step);
+    for (std::size_t s = 0; s < springs.size(); ++s) {
+      const Spring& spring = springs[s];
       step.push_back({spring.vertex,
                       spring.hold,
                       first[static_cast<std::size_t>(spring.hold)] + spring.entry,
                       {spring.acts[0] > 0, spring.acts[1] > 0, spring.acts[2] > 0},
                       spring.before,
-                      spring.place});
+                      spring.place,
+                      bow_of(spring.before, between[s].place, spring.place)});
+    }
     environment.state.time = time;
   }
   return motion;

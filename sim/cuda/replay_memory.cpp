@@ -304,7 +304,11 @@ std::vector<TeamStage> ReplayMemory::stages_for(int environments, int steps) con
   const auto resident = [&](int blocks) { return resident_.at(blocks); };
   if (const int blocks = settings.team_blocks; blocks > 0)
     return {{blocks, std::min(environments, resident(blocks)), 0}};
-  return team_stages(environments, steps > turn_steps ? 2 : 1, resident_.rbegin()->first, resident);
+  const int most_blocks = resident_.rbegin()->first;
+  if (steps > turn_steps) return team_stages(environments, most_blocks, resident);
+  TeamStage stage = one_turn_stage(environments, steps, most_blocks, resident);
+  if (teams > 0) stage.teams = std::min(stage.teams, teams);  // those that have memory
+  return {stage};
 }
 
 void ReplayMemory::plan_teams() {

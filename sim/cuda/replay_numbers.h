@@ -52,7 +52,8 @@ struct HeldPlace {
   int place;
   int axes;  ///< bits 1, 2 and 4: x, y and z
   double target[3];
-  int holds[3];  ///< number of the hold that each axis obeys
+  int holds[3];   ///< number of the hold that each axis obeys
+  double bow[3];  ///< see HeldVertex
 };
 
 /// A spring between a vertex and its place in a soft hold, which moves from one to another over a step.
@@ -62,6 +63,7 @@ struct SpringPlace {
   int hold;   ///< its number
   int entry;  ///< of its stiffness
   double from[3], to[3];
+  double bow[3];  ///< see HeldVertex
 };
 
 /// How one step of one environment went.

@@ -8,8 +8,8 @@ namespace flash::sim::cuda {
 // Springs of soft holds, as sim/step/springs.h. Few vertices have some, so lone threads add what they give:
 // an environment without them pays nothing. Those of a vertex stand one behind the other.
 
-/// The springs of a part of a time step, which goes over the shares from `begin` to `end` of it. A place goes
-/// on a straight line within the step.
+/// The springs of a part of a time step, which goes over the shares from `begin` to `end` of it. Their places
+/// go on the parabolas of HeldVertex within the step.
 struct Springs {
   const SpringPlace* list = nullptr;
   int count = 0;
@@ -37,8 +37,9 @@ struct Springs {
 
  private:
   __device__ static Triple between(const SpringPlace& own, double share) {
-    const Triple from = {own.from[0], own.from[1], own.from[2]}, to = {own.to[0], own.to[1], own.to[2]};
-    return share == 1 ? to : from + share * (to - from);
+    const Triple from = {own.from[0], own.from[1], own.from[2]}, to = {own.to[0], own.to[1], own.to[2]},
+                 bow = {own.bow[0], own.bow[1], own.bow[2]};
+    return share == 1 ? to : from + share * (to - from + (1 - share) * bow);
   }
 };
 
