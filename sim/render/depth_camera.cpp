@@ -26,13 +26,34 @@ Pinhole pinhole(const data::CameraIntrinsics& camera) {
   return {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy};
 }
 
+/// Of one entry for each picture, or one for all.
+template <class Entries>
+const auto& of_picture(const Entries& entries, std::size_t picture) {
+  return entries[entries.size() == 1 ? 0 : picture];
+}
+
+void check_meshes(std::span<const SeenMesh> meshes, std::size_t pictures) {
+  if (meshes.size() > 255)
+    throw data::InputError("meshes: found " + std::to_string(meshes.size()) + ", expected 255 at most");
+  const auto expect = [&](const char* what, std::size_t found) {
+    if (found != 1 && found != pictures)
+      throw data::InputError(std::string("meshes: found ") + what + " for " + std::to_string(found) +
+                             " pictures, expected 1 or " + std::to_string(pictures));
+  };
+  for (const SeenMesh& mesh : meshes) {
+    if (!mesh.triangles) continue;
+    expect("vertices", mesh.vertices.size());
+    if (!mesh.base_from_mesh.empty()) expect("poses", mesh.base_from_mesh.size());
+  }
+}
+
 /// The vertices of a mesh in the frame of the camera.
-void transform(const SeenMesh& mesh, int environment, const Eigen::Isometry3d& camera_from_base,
+void transform(const SeenMesh& mesh, std::size_t picture, const Eigen::Isometry3d& camera_from_base,
                std::vector<Vector3<double>>& seen) {
-  const auto e = static_cast<std::size_t>(environment);
-  const Eigen::Isometry3d pose =
-      mesh.base_from_mesh.empty() ? camera_from_base : camera_from_base * mesh.base_from_mesh[e];
-  const double* vertices = mesh.vertices + environment * mesh.stride;
+  const Eigen::Isometry3d pose = mesh.base_from_mesh.empty()
+                                     ? camera_from_base
+                                     : camera_from_base * of_picture(mesh.base_from_mesh, picture);
+  const double* vertices = of_picture(mesh.vertices, picture);
   seen.resize(static_cast<std::size_t>(mesh.vertex_count));
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const Eigen::Vector3d at = pose * Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(vertices + 3 * i));
@@ -47,11 +68,12 @@ struct Canvas {
 };
 
 void draw(const Pinhole& camera, const Eigen::Isometry3d& base_from_camera, std::span<const SeenMesh> meshes,
-          int environment, Canvas& canvas) {
+          std::size_t picture, Canvas& canvas) {
   canvas.hits.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), {});
   const Eigen::Isometry3d camera_from_base = base_from_camera.inverse();
   for (std::size_t m = 0; m < meshes.size(); ++m) {
-    transform(meshes[m], environment, camera_from_base, canvas.seen);
+    if (!meshes[m].triangles) continue;
+    transform(meshes[m], picture, camera_from_base, canvas.seen);
     const int* corner = meshes[m].triangles->data();
     for (Eigen::Index t = 0; t < meshes[m].triangles->rows(); ++t, corner += 3) {
       const PixelHit own{0, static_cast<std::int32_t>(m), static_cast<std::int32_t>(t)};
@@ -93,29 +115,27 @@ void write(const Pinhole& camera, const Eigen::Isometry3d& base_from_camera,
 }  // namespace
 
 std::vector<PixelHit> see(const data::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_camera,
-                          std::span<const SeenMesh> meshes, int environment) {
+                          std::span<const SeenMesh> meshes) {
   Canvas canvas;
-  draw(pinhole(camera), base_from_camera, meshes, environment, canvas);
+  draw(pinhole(camera), base_from_camera, meshes, 0, canvas);
   return std::move(canvas.hits);
 }
 
+void check_camera(const data::CameraIntrinsics& camera) { pinhole(camera); }
+
 void render(const data::CameraIntrinsics& camera, std::span<const Eigen::Isometry3d> base_from_camera,
-            std::span<const SeenMesh> meshes, std::span<const int> environments,
-            const DepthPictures& pictures, int threads) {
+            std::span<const SeenMesh> meshes, const DepthPictures& pictures, int threads) {
   const Pinhole lens = pinhole(camera);
-  if (meshes.size() > 255)
-    throw data::InputError("meshes: found " + std::to_string(meshes.size()) + ", expected 255 at most");
-  if (base_from_camera.size() != environments.size())
-    throw data::InputError("poses of the camera: found " + std::to_string(base_from_camera.size()) +
-                           ", expected " + std::to_string(environments.size()));
+  const std::size_t count = base_from_camera.size();
+  check_meshes(meshes, count);
   // A worker keeps its memory from picture to picture.
   if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const std::size_t workers = std::min(static_cast<std::size_t>(threads), environments.size());
+  const std::size_t workers = std::min(static_cast<std::size_t>(threads), count);
   std::atomic<std::size_t> next = 0;
   data::for_each_in_parallel(workers, threads, [&](std::size_t) {
     Canvas canvas;
-    for (std::size_t i = next++; i < environments.size(); i = next++) {
-      draw(lens, base_from_camera[i], meshes, environments[i], canvas);
+    for (std::size_t i = next++; i < count; i = next++) {
+      draw(lens, base_from_camera[i], meshes, i, canvas);
       write(lens, base_from_camera[i], canvas.hits, i, pictures);
     }
   });

@@ -24,7 +24,7 @@ data::CameraIntrinsics small_camera() {
 
 SeenMesh seen(const data::TriangleMesh& mesh) {
   return {
-      .triangles = &mesh.triangles, .vertices = mesh.vertices.data(), .vertex_count = mesh.vertices.rows()};
+      .triangles = &mesh.triangles, .vertex_count = mesh.vertices.rows(), .vertices = {mesh.vertices.data()}};
 }
 
 /// Moeller and Trumbore 1997. `depth`: in units of the ray, infinity where it misses; `edge`: how far the
@@ -142,22 +142,22 @@ TEST(DepthCameras, PicturesOfAPlaneAreThoseOfItsEquationOnAnyNumberOfThreads) {
   plane.triangles << 0, 1, 2, 0, 2, 3;
   const data::CameraIntrinsics camera = small_camera();
   const std::size_t pixels = 64 * 48, size = 5;
+  const auto height = [](std::size_t picture) { return 0.01 * static_cast<double>(picture); };
   std::vector<Isometry3d> raised(size, Isometry3d::Identity()), cameras;
   for (std::size_t e = 0; e < size; ++e) {
-    raised[e].translation().z() = 0.01 * static_cast<double>(e);
+    raised[e].translation().z() = height(e);
     Isometry3d pose(Eigen::AngleAxisd(3.14159 - 0.4 - 0.1 * static_cast<double>(e), Vector3d::UnitX()));
     pose.translation() = Vector3d(0.1, 0.2, 0.8);
     cameras.push_back(pose);
   }
   SeenMesh mesh = seen(plane);
   mesh.base_from_mesh = raised;
-  const std::vector<int> environments = {3, 0, 4, 1, 2};
   const auto pictures = [&](int threads) {
     std::vector<float> numbers(5 * pixels * size, -1);
     std::vector<std::uint8_t> instance(pixels * size);
     std::vector<std::int32_t> triangle(pixels * size);
     float* from = numbers.data();
-    render(camera, cameras, {&mesh, 1}, environments,
+    render(camera, cameras, {&mesh, 1},
            {from, from + pixels * size, instance.data(), triangle.data(), from + 2 * pixels * size}, threads);
     for (std::size_t i = 0; i < triangle.size(); ++i) {
       numbers.push_back(static_cast<float>(instance[i]));
@@ -172,8 +172,7 @@ TEST(DepthCameras, PicturesOfAPlaneAreThoseOfItsEquationOnAnyNumberOfThreads) {
     for (std::size_t k = 0; k < pixels; ++k) {
       const Vector3d ray((static_cast<double>(k % 64) - camera.cx) / camera.fx,
                          (static_cast<double>(k / 64) - camera.cy) / camera.fy, 1);
-      const double height = 0.01 * environments[i];
-      const double depth = (height - cameras[i].translation().z()) / (cameras[i].linear() * ray).z();
+      const double depth = (height(i) - cameras[i].translation().z()) / (cameras[i].linear() * ray).z();
       const Vector3d point = cameras[i] * (depth * ray).eval();
       const bool met = depth > 0 && point.head<2>().cwiseAbs().maxCoeff() < 9;
       const std::size_t pixel = i * pixels + k;
@@ -195,6 +194,30 @@ TEST(DepthCameras, ACornerThatIsNoNumberHidesItsTrianglesAlone) {
     EXPECT_EQ(hit.triangle, 1);
     EXPECT_NEAR(hit.inverse_depth, 0.5, 1e-12);
   }
+}
+
+TEST(DepthCameras, MeshesHaveAShapeForEachPictureOrOneForAll) {
+  data::TriangleMesh near{data::Points(3, 3), data::Triangles(1, 3)};
+  near.vertices << -9, -9, 1, 9, -9, 1, 0, 9, 1;
+  near.triangles << 0, 1, 2;
+  data::TriangleMesh far = near;
+  far.vertices.col(2).setConstant(2);
+  const std::vector<Isometry3d> cameras(2, Isometry3d::Identity());
+  const data::CameraIntrinsics camera = small_camera();
+  SeenMesh changing = seen(near), hidden;
+  changing.vertices.push_back(far.vertices.data());
+  std::vector<float> depth(2 * 64 * 48);
+  std::vector<std::uint8_t> instance(depth.size());
+  const DepthPictures pictures{.depth = depth.data(), .instance = instance.data()};
+  render(camera, cameras, std::vector{hidden, changing}, pictures, 1);
+  EXPECT_FLOAT_EQ(depth.front(), 1);
+  EXPECT_FLOAT_EQ(depth.back(), 2);
+  EXPECT_EQ(instance.back(), 1);  // the hidden one keeps its number
+  changing.vertices.push_back(far.vertices.data());
+  EXPECT_THROW(render(camera, cameras, {&changing, 1}, pictures, 1), data::InputError);
+  changing = seen(near);
+  changing.base_from_mesh.resize(3, Isometry3d::Identity());
+  EXPECT_THROW(render(camera, cameras, {&changing, 1}, pictures, 1), data::InputError);
 }
 
 TEST(DepthCameras, RefuseWhatIsNoCamera) {
