@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <string>
 #include <thread>
 #include <utility>
@@ -16,9 +17,12 @@ Pinhole pinhole(const data::CameraIntrinsics& camera) {
   if (camera.width < 1 || camera.height < 1)
     throw data::InputError("camera: found a picture of " + std::to_string(camera.width) + " x " +
                            std::to_string(camera.height) + " pixels, expected 1 x 1 or more");
-  if (!(camera.fx > 0 && camera.fy > 0))
+  if (!(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy)))
     throw data::InputError("camera: found the focal lengths " + std::to_string(camera.fx) + " and " +
-                           std::to_string(camera.fy) + " px, expected them above 0");
+                           std::to_string(camera.fy) + " px, expected finite ones above 0");
+  if (!std::isfinite(camera.cx) || !std::isfinite(camera.cy))
+    throw data::InputError("camera: found the centre " + std::to_string(camera.cx) + ", " +
+                           std::to_string(camera.cy) + " px, expected finite numbers");
   for (const double coefficient : camera.distortion)
     if (coefficient != 0)
       throw data::InputError(

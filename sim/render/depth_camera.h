@@ -20,8 +20,8 @@ struct SeenMesh {
 
 /// What each pixel sees, row by row; nothing hides what lies before it. Each pixel is drawn once where two
 /// triangles share an edge. Of two at one depth the first shows. Triangles with a corner that is no number
-/// are not seen. Throws data::InputError for an empty picture, a focal length that is not above 0 and a lens
-/// with distortion: pictures of depth are rectified before they are used.
+/// are not seen. Throws data::InputError for an empty picture, a focal length that is not above 0, a
+/// centre that is no number and a lens with distortion: pictures of depth are rectified before they are used.
 std::vector<PixelHit> see(const data::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_camera,
                           std::span<const SeenMesh> meshes);
 

@@ -226,6 +226,9 @@ TEST(DepthCameras, RefuseWhatIsNoCamera) {
   camera.fx = 0;
   EXPECT_THROW(see(camera, pose, {}), data::InputError);
   camera = small_camera();
+  camera.cy = std::nan("");
+  EXPECT_THROW(see(camera, pose, {}), data::InputError);
+  camera = small_camera();
   camera.height = 0;
   EXPECT_THROW(see(camera, pose, {}), data::InputError);
   camera = small_camera();
