@@ -119,7 +119,8 @@ void LiveCameras::render(const std::string& name, std::span<const int> chosen,
     meshes.push_back({.triangles = &body.surface.triangles,
                       .vertex_count = body.surface.vertices.rows(),
                       .vertices = {body.surface.vertices.data()},
-                      .base_from_mesh = poses_now(environments, body.frame)});
+                      .base_from_mesh = poses_now(environments, body.frame),
+                      .yields = drawn_through});
   for (std::size_t m = 0; m < meshes.size(); ++m)
     if (!sees(own.camera, m)) meshes[m].triangles = nullptr;
   std::vector<Isometry3d> base_from_camera = poses_now(environments, own.frame);

@@ -25,6 +25,10 @@ struct RigidBody {
 /// How far from where a scene starts planes and cylinders without ends are drawn [m].
 inline constexpr double drawn_reach = 100;
 
+/// Objects show where they lie no deeper than this below the surface of a rigid body: what lies on a table is
+/// at its height to rounding, and edges of a mesh cut what is round [m].
+inline constexpr double drawn_through = 2e-3;
+
 /// What the objects of a scene collide with, in the order of the obstacles of `environment`, which is one of
 /// that scene. Round ones have 48 flat sides.
 std::vector<RigidBody> rigid_bodies(const data::Scene& scene, const Environment& environment);

@@ -16,6 +16,9 @@ struct SeenMesh {
   std::ptrdiff_t vertex_count = 0;
   std::vector<const double*> vertices{};  ///< in each picture: x y z of each [m]; one: the same in all
   std::vector<Eigen::Isometry3d> base_from_mesh{};  ///< in each picture; one: likewise; none: the base frame
+  /// Meshes that yield nothing show through it where they lie no deeper than this below its surface [m]:
+  /// cloth lies on a table, and not half in it.
+  double yields = 0;
 };
 
 /// What each pixel sees, row by row; nothing hides what lies before it. Each pixel is drawn once where two

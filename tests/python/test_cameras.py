@@ -36,8 +36,8 @@ def random_poses(random, count, centre, spread):
 
 
 def meet(origin, directions, corners):
-    """Depth at which rays meet triangles (T, 3, 3), in lengths of a ray: the least, its triangle, and how near a ray comes to
-    an edge, as a share of a triangle (Moeller and Trumbore 1997)."""
+    """Depth at which rays meet triangles (T, 3, 3), in lengths of a ray: the least, its triangle, how near a ray comes to an
+    edge, as a share of a triangle (Moeller and Trumbore 1997), and the ray's way through a layer of 1 m below that triangle."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = np.cross(directions[:, None], b)
     s = origin - corners[:, 0]
@@ -49,7 +49,10 @@ def meet(origin, directions, corners):
     inner = np.minimum(np.minimum(u, v), 1 - u - v)
     hit = np.where((inner >= 0) & (depth >= 1e-3), depth, np.inf)
     close = np.where(depth > 0, np.abs(inner), np.inf).min(axis=1)
-    return hit.min(axis=1), hit.argmin(axis=1), close
+    normals = np.cross(a, b)
+    first = hit.argmin(axis=1)
+    across = np.abs((directions * (normals / np.linalg.norm(normals, axis=1)[:, None])[first]).sum(axis=1))
+    return hit.min(axis=1), first, close, 1 / across
 
 
 def box_corners(size, pose):
@@ -123,25 +126,32 @@ def test_random_scenes_are_what_rays_meet(sim):
         hands = random_poses(random, 3, [0.1, 0.1, 0.15], 0.1)
         eyes = random_poses(random, 3, [0.1, 0.1, 0.2], 0.3)
         eyes[:2, 3:] = flash_sim.look_at(eyes[:2, :3], [0.1, 0.1, 0.15])[:, 3:]
+        sim.reset(positions=towels)
         sim.move_ee("hand", hands)
         sim.step()
-        sim.reset(positions=towels)
+        towels = np.array(sim.positions())
         sim.set_camera("eye", eyes)
-        # A reset hand is at its start.
         seen = sim.render("eye", ALL)
         for e in range(3):
             rotation, place = matrix(eyes[e])
             ways = (rays() @ rotation.T).reshape(-1, 3)
             towel = towels[e][sim.triangles()]
-            hand = box_corners([0.06, 0.06, 0.02], np.array([0.2, 0.2, 0.05, 0, 0, 0, 1]))
+            hand = box_corners([0.06, 0.06, 0.02], hands[e])
             met = [meet(place, ways, corners) for corners in (towel, hand)]
             table = np.where(ways[:, 2] * place[2] < 0, -place[2] / ways[:, 2], np.inf)
-            depths = np.stack([met[0][0], np.where(table < 100, table, np.inf), met[1][0]])
-            clear = np.minimum(met[0][2], met[1][2]) > 1e-6  # else rounding decides
-            clear &= ~((table > 90) & np.isfinite(table))
-            depth = depths.min(axis=0)
+            horizon = (table > 90) & np.isfinite(table)  # where the square that is drawn may end
+            table[horizon] = np.inf
+            # Of both rigid bodies the nearer hides the towel, but for what lies within 2 mm of its surface.
+            hand_first = met[1][0] < table
+            rigid = np.where(hand_first, met[1][0], table)
+            layer = 2e-3 * np.where(hand_first, met[1][3], 1 / np.abs(ways[:, 2]))
+            shows = met[0][0] < rigid + layer
+            depth = np.where(shows, met[0][0], rigid)
             none = ~np.isfinite(depth)
-            instance = np.where(none, NOTHING, depths.argmin(axis=0))
+            instance = np.where(none, NOTHING, np.where(shows, 0, np.where(hand_first, 2, 1)))
+            clear = np.minimum(met[0][2], met[1][2]) > 1e-6  # else rounding decides
+            with np.errstate(invalid="ignore"):
+                clear &= ~(np.abs(met[0][0] - rigid - layer) < 1e-9) & ~horizon
             assert np.array_equal(seen["instance"][e].ravel()[clear], instance[clear])
             assert np.abs(seen["depth"][e].ravel() - np.where(none, 0, depth))[clear].max() < 1e-5
             of_towel = clear & (instance == 0)
@@ -160,8 +170,19 @@ def test_what_is_nearer_hides(sim):
     assert hidden.any() and (seen["depth"][hidden] < alone["depth"][hidden]).all()
     of_hand = seen["depth"][seen["instance"] == 2]
     assert np.median(of_hand) == of_hand.min() == np.float32(0.44)  # its lid; the others are of its sides
-    # The towel lies on the table: of two at one depth the first shows.
     assert (seen["depth"][seen["instance"] == 0] == np.float32(0.5)).all()
+
+
+@pytest.mark.parametrize("elevation", [90, 60, 30, 12])
+def test_what_lies_on_a_table_is_seen_whole(scene, elevation):
+    """Both are in one plane, so that rounding alone would decide."""
+    sim = start(scene)
+    way = np.array([0, -np.cos(np.radians(elevation)), np.sin(np.radians(elevation))])
+    pose = flash_sim.look_at([0.1, 0.1, 0] + 0.6 * way, [0.1, 0.1, 0], [0, 1, 1])
+    add(sim, "eye", pose)
+    add(sim, "of towel", pose, sees=["towel"])
+    seen, alone = sim.render("eye"), sim.render("of towel")
+    assert np.array_equal(seen["instance"] == 0, alone["instance"] == 0) and (alone["instance"] == 0).sum() > 100
 
 
 def test_what_passes_through_is_seen_where_it_is_named(scene):

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <vector>
 
 #include "data/files/error.h"
+#include "data/mesh/procedural_mesh.h"
 
 namespace flash::sim {
 namespace {
@@ -218,6 +220,45 @@ TEST(DepthCameras, MeshesHaveAShapeForEachPictureOrOneForAll) {
   changing = seen(near);
   changing.base_from_mesh.resize(3, Isometry3d::Identity());
   EXPECT_THROW(render(camera, cameras, {&changing, 1}, pictures, 1), data::InputError);
+}
+
+/// A sheet of many triangles at a depth below a plane, seen from any side: it shows as deep as the plane
+/// yields.
+TEST(DepthCameras, WhatLiesOnAPlaneThatYieldsShows) {
+  constexpr double yields = 2e-3;
+  data::TriangleMesh plane{data::Points(4, 3), data::Triangles(2, 3)};
+  plane.vertices << -9, -9, 0, 9, -9, 0, 9, 9, 0, -9, 9, 0;
+  plane.triangles << 0, 1, 2, 0, 2, 3;
+  data::TriangleMesh sheet = data::rectangle({.width = 0.5, .height = 0.5, .cells_x = 23, .cells_y = 23});
+  sheet.vertices.rowwise() -= Eigen::RowVector3d(0.25, 0.25, 0);
+  const Isometry3d turn(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()));
+  const auto turned = [&](data::TriangleMesh mesh) {
+    mesh.vertices = (mesh.vertices * turn.linear().transpose()).eval();
+    return mesh;
+  };
+  const data::TriangleMesh turned_plane = turned(plane);
+  for (const double tilt : {0.0, 0.5, 1.0, 1.4, 1.5})
+    for (const double depth : {-0.1, 0.0, 0.99 * yields, 1.01 * yields, 0.1}) {
+      data::TriangleMesh lower = sheet;
+      lower.vertices.col(2).array() -= depth;
+      lower = turned(lower);
+      SeenMesh below = seen(turned_plane), own = seen(lower);
+      below.yields = yields;
+      const Isometry3d camera = turn *
+                                Isometry3d(Eigen::AngleAxisd(std::numbers::pi - tilt, Vector3d::UnitX())) *
+                                Eigen::Translation3d(0, 0, -0.7);
+      const std::vector<PixelHit> alone = see(small_camera(), camera, {&own, 1});
+      const std::vector<PixelHit> hits = see(small_camera(), camera, std::vector{own, below});
+      const std::vector<PixelHit> turned_round = see(small_camera(), camera, std::vector{below, own});
+      for (std::size_t i = 0; i < hits.size(); ++i) {
+        const bool shows = alone[i].mesh == 0 && depth < yields;
+        EXPECT_EQ(hits[i].mesh == 0, shows) << tilt << ' ' << depth;
+        EXPECT_EQ(turned_round[i].mesh == 1, shows);
+        if (shows) {
+          EXPECT_EQ(hits[i].inverse_depth, alone[i].inverse_depth);  // where it is, not where the plane is
+        }
+      }
+    }
 }
 
 TEST(DepthCameras, RefuseWhatIsNoCamera) {
