@@ -7,6 +7,7 @@
 
 #include "data/files/error.h"
 #include "data/numbers/worst.h"
+#include "sim/named.h"
 #include "sim/scene/material_values.h"
 #include "sim/scene/scene.h"
 #include "sim/scene_worlds.h"
@@ -29,27 +30,6 @@ struct LiveEffector {
 
 Tensor dense(const std::vector<double>& numbers, std::vector<std::int64_t> shape) {
   return {.data = numbers.data(), .shape = std::move(shape)};
-}
-
-std::string listed(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list.empty() ? "no name, as there is none" : "one of " + list;
-}
-
-/// Number of what has a name among those that are there.
-std::size_t number_of(const char* what, const std::string& name, const std::vector<std::string>& names) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end())
-    throw InputError(std::string(what) + ": found \"" + name + "\", expected " + listed(names));
-  return static_cast<std::size_t>(found - names.begin());
-}
-
-template <class Things>
-std::vector<std::string> names_of(const Things& things) {
-  std::vector<std::string> names;
-  for (const auto& thing : things) names.push_back(thing.name);
-  return names;
 }
 
 LiveObject object_of(const Sheet& sheet, std::size_t body, std::string name, std::size_t worlds) {
@@ -110,6 +90,7 @@ struct LiveScene::Storage {
   std::deque<LiveEffector> effectors;  ///< whose numbers stay where they are
   std::vector<int> every;
   std::vector<WorldStatus> status;
+  LiveCameras cameras;
 
   /// The environments that are meant, each once.
   std::span<const int> chosen_of(const Chosen& chosen) const {
@@ -145,6 +126,23 @@ struct LiveScene::Storage {
     all.shape[1] = object.vertices;
     all.strides = {3 * vertices, 3, 1};
     return all;
+  }
+
+  /// An object in the environments chosen.
+  SeenMesh seen(const LiveObject& object, std::span<const int> chosen) const {
+    SeenMesh mesh{.triangles = &object.triangles, .vertex_count = object.vertices};
+    for (const int e : chosen)
+      mesh.vertices.push_back(worlds[object.worlds].environment(e).state.positions.data() +
+                              3 * object.first_vertex);
+    return mesh;
+  }
+
+  /// An environment where the objects that are not lost have it.
+  const Environment* latest(int e) const {
+    const auto later = [e](const Worlds& a, const Worlds& b) {
+      return a.environment(e).state.time < b.environment(e).state.time;
+    };
+    return &std::max_element(worlds.begin(), worlds.end(), later)->environment(e);
   }
 
   /// What the views show of all objects together.
@@ -226,6 +224,7 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, co
   s.every.resize(static_cast<std::size_t>(environments));
   std::iota(s.every.begin(), s.every.end(), 0);
   s.status.resize(s.every.size());
+  s.cameras = LiveCameras(names_of(s.objects), rigid_bodies(scene, s.worlds.front().environment(0)));
   s.show();
 }
 
@@ -257,6 +256,7 @@ void LiveScene::add_end_effector(const EndEffector& effector, const Tensor& pose
   live.poses = live.start_poses;
   live.forces.resize(3 * s.every.size());
   live.closed.resize(s.every.size());
+  s.cameras.add_body(rigid_body(effector, live.numbers.front().frame));
   s.effectors.push_back(std::move(live));
 }
 
@@ -506,6 +506,31 @@ void LiveScene::load(const Chosen& environments, const Saved& saved) {
     }
   if (std::ssize(chosen) == s.environments) s.interrupted = false;
   s.show();
+}
+
+std::vector<std::string> LiveScene::instances() const { return storage_->cameras.instances(); }
+
+std::vector<std::string> LiveScene::cameras() const { return storage_->cameras.names(); }
+
+const LiveCamera& LiveScene::camera(const std::string& name) const { return storage_->cameras.camera(name); }
+
+void LiveScene::add_camera(const LiveCamera& camera, const Tensor& poses) {
+  storage_->cameras.add(camera, storage_->every, poses);
+}
+
+void LiveScene::set_camera(const std::string& name, const Chosen& environments, const Tensor& poses) {
+  storage_->cameras.set_poses(name, storage_->chosen_of(environments), poses);
+}
+
+void LiveScene::render(const std::string& camera, const Chosen& environments,
+                       const DepthPictures& pictures) const {
+  const Storage& s = *storage_;
+  const std::span<const int> chosen = s.chosen_of(environments);
+  std::vector<SeenMesh> objects;
+  for (const LiveObject& object : s.objects) objects.push_back(s.seen(object, chosen));
+  std::vector<const Environment*> now;
+  for (const int e : chosen) now.push_back(s.latest(e));
+  s.cameras.render(camera, chosen, now, std::move(objects), pictures, s.threads);
 }
 
 }  // namespace flash::sim

@@ -8,6 +8,7 @@
 
 #include "data/mesh/mesh.h"
 #include "data/scene/scene.h"
+#include "sim/live_cameras.h"
 #include "sim/worlds.h"
 
 namespace flash::sim {
@@ -104,6 +105,21 @@ class LiveScene {
 
   /// Why an environment is lost; empty where it is not.
   const std::string& why_lost(int environment) const;
+
+  /// What pictures tell apart, by its number there: the objects, the obstacles, then end effectors that were
+  /// added.
+  std::vector<std::string> instances() const;
+  std::vector<std::string> cameras() const;  ///< in their order
+  const LiveCamera& camera(const std::string& name) const;
+
+  /// A camera in every environment, at any time. `poses`: environments x 7, of its optical frame (x right, y
+  /// down, z forward) in the base frame, or in that of its carrier.
+  void add_camera(const LiveCamera& camera, const Tensor& poses);
+  void set_camera(const std::string& name, const Chosen& environments, const Tensor& poses);
+
+  /// Draws the environments chosen as they stand now, a picture each, in their order. What has no end reaches
+  /// `drawn_reach` past the objects' start. The same bits on any number of threads.
+  void render(const std::string& camera, const Chosen& environments, const DepthPictures& pictures) const;
 
   /// Environments as they stand. Takes as much memory as they do.
   class Saved;

@@ -14,8 +14,9 @@ using Eigen::Vector3d;
 constexpr int kAround = 48, kAlong = 12;  // points of a circle, of a quarter of one
 constexpr double kPast = 0.6;             // of the box's diagonal, to each side of its middle
 
-Eigen::Isometry3d standing(const Eigen::Isometry3d& pose, const Trajectory& trajectory, double time) {
-  return trajectory.times.empty() ? pose : pose_at(trajectory, time);
+/// Where what has a `pose` without a trajectory stands in its frame.
+Eigen::Isometry3d in_frame(const Eigen::Isometry3d& pose, const Trajectory& trajectory) {
+  return trajectory.times.empty() ? pose : Eigen::Isometry3d::Identity();
 }
 
 TriangleMesh placed(TriangleMesh mesh, const Eigen::Isometry3d& pose) {
@@ -50,6 +51,64 @@ TriangleMesh turned(const std::vector<double>& radii, const std::vector<double>&
   return mesh;
 }
 
+TriangleMesh capsule_surface(double radius, double half_length) {
+  std::vector<double> radii, heights;
+  for (const int end : {-1, 1})
+    for (int k = 0; k <= kAlong; ++k) {
+      const double angle = 0.5 * std::numbers::pi * (end < 0 ? k - kAlong : k) / kAlong;
+      radii.push_back(radius * std::cos(angle));
+      heights.push_back(end * half_length + radius * std::sin(angle));
+    }
+  return turned(radii, heights);
+}
+
+const Trajectory* trajectory_of(const SceneObstacle& obstacle) {
+  if (const auto* box = std::get_if<SceneBox>(&obstacle.shape)) return &box->trajectory;
+  if (const auto* capsule = std::get_if<SceneCapsule>(&obstacle.shape)) return &capsule->trajectory;
+  if (const auto* mesh = std::get_if<SceneMesh>(&obstacle.shape)) return &mesh->trajectory;
+  return nullptr;
+}
+
+TriangleMesh surface_of(const ScenePlane& plane, const Eigen::AlignedBox3d& about) {
+  const double half = kPast * about.diagonal().norm();
+  TriangleMesh mesh;
+  mesh.vertices.resize(4, 3);
+  mesh.vertices << -half, -half, 0, half, -half, 0, half, half, 0, -half, half, 0;
+  mesh.triangles.resize(2, 3);
+  mesh.triangles << 0, 1, 2, 0, 2, 3;
+  const Vector3d middle = about.center();
+  return placed(std::move(mesh),
+                along(plane.normal, middle - plane.normal.dot(middle - plane.point) * plane.normal));
+}
+
+TriangleMesh surface_of(const SceneBox& box, const Eigen::AlignedBox3d& /*about*/) {
+  return placed(box_surface(box.size), in_frame(box.pose, box.trajectory));
+}
+
+TriangleMesh surface_of(const SceneCylinder& cylinder, const Eigen::AlignedBox3d& about) {
+  const double half = kPast * about.diagonal().norm();
+  const Vector3d middle = cylinder.point + cylinder.axis.dot(about.center() - cylinder.point) * cylinder.axis;
+  return placed(turned({cylinder.radius, cylinder.radius}, {-half, half}), along(cylinder.axis, middle));
+}
+
+TriangleMesh surface_of(const SceneCapsule& capsule, const Eigen::AlignedBox3d& /*about*/) {
+  return placed(capsule_surface(capsule.radius, capsule.half_length), along(capsule.axis, capsule.point));
+}
+
+TriangleMesh surface_of(const SceneMesh& mesh, const Eigen::AlignedBox3d& /*about*/) {
+  return placed(load_obstacle_mesh(mesh.file, mesh.scale).mesh, in_frame(mesh.pose, mesh.trajectory));
+}
+
+}  // namespace
+
+std::vector<SceneObstacle> colliding(const Scene& scene) {
+  std::vector<SceneObstacle> all = scene.obstacles;
+  for (const SceneEndEffector& effector : scene.end_effectors)
+    if (effector.collides)
+      all.push_back({effector.name, SceneBox{effector.size, {}, effector.trajectory}, effector.friction});
+  return all;
+}
+
 TriangleMesh box_surface(const Vector3d& size) {
   TriangleMesh mesh;
   mesh.vertices.resize(8, 3);
@@ -62,64 +121,19 @@ TriangleMesh box_surface(const Vector3d& size) {
   return mesh;
 }
 
-TriangleMesh capsule_surface(double radius, double half_length) {
-  std::vector<double> radii, heights;
-  for (const int end : {-1, 1})
-    for (int k = 0; k <= kAlong; ++k) {
-      const double angle = 0.5 * std::numbers::pi * (end < 0 ? k - kAlong : k) / kAlong;
-      radii.push_back(radius * std::cos(angle));
-      heights.push_back(end * half_length + radius * std::sin(angle));
-    }
-  return turned(radii, heights);
+TriangleMesh obstacle_surface(const SceneObstacle& obstacle, const Eigen::AlignedBox3d& about) {
+  return std::visit([&](const auto& shape) { return surface_of(shape, about); }, obstacle.shape);
 }
-
-TriangleMesh surface_of(const ScenePlane& plane, double /*time*/, const Eigen::AlignedBox3d& about) {
-  const double half = kPast * about.diagonal().norm();
-  TriangleMesh mesh;
-  mesh.vertices.resize(4, 3);
-  mesh.vertices << -half, -half, 0, half, -half, 0, half, half, 0, -half, half, 0;
-  mesh.triangles.resize(2, 3);
-  mesh.triangles << 0, 1, 2, 0, 2, 3;
-  const Vector3d middle = about.center();
-  return placed(std::move(mesh),
-                along(plane.normal, middle - plane.normal.dot(middle - plane.point) * plane.normal));
-}
-
-TriangleMesh surface_of(const SceneBox& box, double time, const Eigen::AlignedBox3d& /*about*/) {
-  return placed(box_surface(box.size), standing(box.pose, box.trajectory, time));
-}
-
-TriangleMesh surface_of(const SceneCylinder& cylinder, double /*time*/, const Eigen::AlignedBox3d& about) {
-  const double half = kPast * about.diagonal().norm();
-  const Vector3d middle = cylinder.point + cylinder.axis.dot(about.center() - cylinder.point) * cylinder.axis;
-  return placed(turned({cylinder.radius, cylinder.radius}, {-half, half}), along(cylinder.axis, middle));
-}
-
-TriangleMesh surface_of(const SceneCapsule& capsule, double time, const Eigen::AlignedBox3d& /*about*/) {
-  const Eigen::Isometry3d frame = standing(Eigen::Isometry3d::Identity(), capsule.trajectory, time);
-  return placed(capsule_surface(capsule.radius, capsule.half_length),
-                frame * along(capsule.axis, capsule.point));
-}
-
-TriangleMesh surface_of(const SceneMesh& mesh, double time, const Eigen::AlignedBox3d& /*about*/) {
-  return placed(load_obstacle_mesh(mesh.file, mesh.scale).mesh, standing(mesh.pose, mesh.trajectory, time));
-}
-
-}  // namespace
 
 std::vector<TriangleMesh> obstacle_surfaces(const Scene& scene, double time,
                                             const Eigen::AlignedBox3d& about) {
   std::vector<TriangleMesh> surfaces;
-  for (const SceneObstacle& obstacle : scene.obstacles)
-    surfaces.push_back(
-        std::visit([&](const auto& shape) { return surface_of(shape, time, about); }, obstacle.shape));
-  for (const SceneEndEffector& effector : scene.end_effectors)
-    if (effector.collides) {
-      SceneBox box;
-      box.size = effector.size;
-      box.trajectory = effector.trajectory;
-      surfaces.push_back(surface_of(box, time, about));
-    }
+  for (const SceneObstacle& obstacle : colliding(scene)) {
+    surfaces.push_back(obstacle_surface(obstacle, about));
+    const Trajectory* trajectory = trajectory_of(obstacle);
+    if (trajectory && !trajectory->times.empty())
+      surfaces.back() = placed(std::move(surfaces.back()), pose_at(*trajectory, time));
+  }
   return surfaces;
 }
 

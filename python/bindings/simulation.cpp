@@ -16,6 +16,7 @@
 
 #include "data/files/error.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/cameras.h"
 
 namespace flash::python {
 
@@ -179,6 +180,8 @@ void bind_simulation(nb::module_& module) {
   simulation.def("set_gravity", [](Simulation& s, const Environments& environments, const Numbers& gravity) {
     s.use([&](LiveScene& live) { live.set_gravity(environments, tensor_of(gravity)); });
   });
+
+  bind_cameras(simulation);
 }
 
 }  // namespace flash::python

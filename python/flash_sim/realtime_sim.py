@@ -4,7 +4,7 @@ import os
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flash_sim import _core, arguments
+from flash_sim import _core, arguments, cameras
 from flash_sim.asset import Asset
 
 STATUS = np.dtype([(name, np.float64) for name in
@@ -251,6 +251,66 @@ class RealtimeSim:
             simulation.set_material(body, ids, list(values.items()))
         return drawn
 
+    # -- cameras ----------------------------------------------------------------------------------------------------------
+
+    def add_camera(self, name: str, width: int, height: int, fx: float, fy: float, cx: float, cy: float, pose: ArrayLike,
+                   carrier: str | None = None, sees: list[str] | None = None) -> None:
+        """Adds a depth camera to every environment, at any time after initialize().
+
+        width, height: of its pictures [px]. fx, fy: focal lengths, and cx, cy: where the optical axis meets the picture [px];
+        pixel (0, 0) is the centre of the upper left pixel. The lens has no distortion.
+        pose: of the optical frame (x right, y down, z forward) in the base frame, (7,) or (n_envs, 7), or as matrices (4, 4) or
+        (n_envs, 4, 4). look_at makes such poses. With a `carrier`, the name of an end effector or of an obstacle that moves,
+        the pose is in its frame, and the camera moves with it.
+        sees: names of instances; what else there is is not drawn. None: all bodies, and what they collide with.
+        """
+        simulation = self._ready("add_camera")
+        size = [arguments.whole_number(f"add_camera: {what}", value, 1, 16384) for what, value in
+                (("width", width), ("height", height))]
+        lens = [float(self._above("add_camera: fx", fx, (), 0, equal=False)),
+                float(self._above("add_camera: fy", fy, (), 0, equal=False)),
+                float(arguments.numbers("add_camera: cx", cx, ())), float(arguments.numbers("add_camera: cy", cy, ()))]
+        if not arguments.text("add_camera: name", name) or name in simulation.cameras():
+            raise ValueError(f"add_camera: name: found {name!r}, expected a name that no other camera has")
+        if carrier is not None and not arguments.text("add_camera: carrier", carrier):
+            raise ValueError("add_camera: carrier: found '', expected a name, or None")
+        if sees is not None:
+            if not isinstance(sees, (list, tuple)) or not sees:
+                found = "no name" if isinstance(sees, (list, tuple)) else type(sees).__name__
+                raise TypeError(f"add_camera: sees: found {found}, expected a list of names, or None")
+            for seen in sees:
+                arguments.one_of("add_camera: sees", seen, simulation.instances())
+        poses = cameras.poses("add_camera: pose", pose, self._initialized_envs)
+        simulation.add_camera(name, size, lens, poses, carrier or "", list(sees or []))
+
+    def set_camera(self, name: str, pose: ArrayLike, env_ids: ArrayLike | None = None) -> None:
+        """Where a camera stands from now on: (7,), (n, 7), (4, 4) or (n, 4, 4), as add_camera has it."""
+        simulation = self._ready("set_camera")
+        arguments.one_of("set_camera: name", name, simulation.cameras())
+        ids = self._ids("set_camera", env_ids)
+        simulation.set_camera(name, ids, cameras.poses("set_camera: pose", pose, len(ids)))
+
+    def render(self, name: str, pictures: tuple[str, ...] | None = None, env_ids: ArrayLike | None = None,
+               out: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
+        """What a camera sees now: a dict of arrays (n, height, width), by the names of `pictures`.
+
+        "depth" is float32, along the optical axis [m], 0 where there is nothing. "distance" is float32, along the ray [m].
+        "instance" is uint8, the number of what is seen in sim.instances; 255 is nothing. "triangle" is int32, its row in
+        triangles(body), -1 is nothing. "points" is float32 (n, height, width, 3), in the base frame [m], 0 0 0 is nothing.
+        None: depth and instance.
+
+        Each call draws the state as it stands then, also after a reset. The arrays are new ones, which nobody changes, or
+        those of `out`: a dict whose arrays are written to and returned. Then its names are the pictures.
+        Other threads of Python run meanwhile.
+        """
+        simulation = self._ready("render")
+        arguments.one_of("render: name", name, simulation.cameras())
+        ids = self._ids("render", env_ids)
+        width, height = simulation.camera_size(name)
+        drawn = cameras.pictures("render", pictures, (len(ids), height, width), out)
+        simulation.render(name, ids, *(drawn.get(picture) for picture in cameras.PICTURES))
+        return drawn
+
     # -- what it is made of -----------------------------------------------------------------------------------------------
 
     @property
@@ -278,6 +338,16 @@ class RealtimeSim:
     def obstacles(self) -> list[str]:
         """Names of what bodies collide with."""
         return self._ready("obstacles").obstacles()
+
+    @property
+    def cameras(self) -> list[str]:
+        """Names of those that were added."""
+        return self._ready("cameras").cameras()
+
+    @property
+    def instances(self) -> list[str]:
+        """What pictures tell apart: a pixel of instance k sees instances[k]. Bodies, obstacles, then added end effectors."""
+        return self._ready("instances").instances()
 
     @property
     def notices(self) -> list[str]:

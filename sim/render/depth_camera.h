@@ -10,21 +10,26 @@
 
 namespace flash::sim {
 
-/// A triangle mesh that cameras see, with both sides, in one or many environments.
+/// A triangle mesh that cameras see, with both sides, in one or many pictures.
 struct SeenMesh {
-  const data::Triangles* triangles = nullptr;
-  const double* vertices = nullptr;  ///< of environment 0: x y z of each [m]
+  const data::Triangles* triangles = nullptr;  ///< null: it is not seen, and keeps its number
   std::ptrdiff_t vertex_count = 0;
-  std::ptrdiff_t stride = 0;                            ///< numbers from one environment to the next
-  std::span<const Eigen::Isometry3d> base_from_mesh{};  ///< of each environment; empty: the base frame
+  std::vector<const double*> vertices{};  ///< in each picture: x y z of each [m]; one: the same in all
+  std::vector<Eigen::Isometry3d> base_from_mesh{};  ///< in each picture; one: likewise; none: the base frame
+  /// Meshes that yield nothing show through it where they lie no deeper than this below its surface [m]:
+  /// cloth lies on a table, and not half in it.
+  double yields = 0;
 };
 
 /// What each pixel sees, row by row; nothing hides what lies before it. Each pixel is drawn once where two
 /// triangles share an edge. Of two at one depth the first shows. Triangles with a corner that is no number
-/// are not seen. Throws data::InputError for an empty picture, a focal length that is not above 0 and a lens
-/// with distortion: pictures of depth are rectified before they are used.
+/// are not seen. Throws data::InputError for an empty picture, a focal length that is not above 0, a
+/// centre that is no number and a lens with distortion: pictures of depth are rectified before they are used.
 std::vector<PixelHit> see(const data::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_camera,
-                          std::span<const SeenMesh> meshes, int environment = 0);
+                          std::span<const SeenMesh> meshes);
+
+/// Throws as `see` does.
+void check_camera(const data::CameraIntrinsics& camera);
 
 /// Where pictures go, dense, picture after picture; null: not wanted.
 struct DepthPictures {
@@ -35,11 +40,10 @@ struct DepthPictures {
   float* points = nullptr;           ///< height x width x 3 each, in the base frame [m]; 0 0 0: nothing
 };
 
-/// A picture of each of `environments`, by their numbers, from its camera in `base_from_camera`, one each in
-/// their order. The same bits on any number of threads. Throws as `see` does, and data::InputError for more
-/// than 255 meshes.
+/// A picture from each pose of `base_from_camera`. The same bits on any number of threads; 0: one a
+/// processor. Throws as `see` does, and data::InputError for more than 255 meshes and for a mesh that has
+/// vertices or poses for another number of pictures.
 void render(const data::CameraIntrinsics& camera, std::span<const Eigen::Isometry3d> base_from_camera,
-            std::span<const SeenMesh> meshes, std::span<const int> environments,
-            const DepthPictures& pictures, int threads);
+            std::span<const SeenMesh> meshes, const DepthPictures& pictures, int threads);
 
 }  // namespace flash::sim

@@ -16,10 +16,8 @@ struct DepthView {
   Eigen::ArrayXXi triangle;  ///< index of the triangle seen in its surface; -1 where there is nothing
 };
 
-/// Renders triangle meshes (base frame) into one z-buffer, so that each hides what lies behind it, itself
-/// included. The depth is exact at the pixel centre: 1/z is linear in the image over a triangle. Both sides
-/// of a triangle are seen; triangles that reach closer to the camera plane than 1 mm are not. Throws
-/// data::InputError on lens distortion.
+/// Renders triangle meshes (base frame) as sim::see does, so that each hides what lies behind it, itself
+/// included. The depth is exact at the pixel centre. Throws data::InputError as that does.
 DepthView render_depth(const data::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_camera,
                        const std::vector<data::TriangleMesh>& surfaces);
 

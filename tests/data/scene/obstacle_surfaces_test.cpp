@@ -86,6 +86,16 @@ TEST(ObstacleSurfaces, StandWhereTheyAreAtTheTime) {
               2, 1e-12);
 }
 
+TEST(ObstacleSurfaces, OfOneObstacleStandInItsFrame) {
+  SceneBox box = box_of(Vector3d::Ones());
+  box.pose.translation() = Vector3d(3, 0, 0);
+  EXPECT_NEAR(obstacle_surface({"resting", box, {}}, kAbout).vertices.col(0).mean(), 3, 1e-12);
+  box.trajectory = moved_up();  // takes the place of the pose
+  const TriangleMesh moving = obstacle_surface({"moving", box, {}}, kAbout);
+  EXPECT_LT(moving.vertices.colwise().mean().norm(), 1e-12);
+  EXPECT_EQ(moving.vertices, box_surface(Vector3d::Ones()).vertices);
+}
+
 TEST(ObstacleSurfaces, OfEndEffectorsThatCollideAreThereToo) {
   Scene scene;
   scene.end_effectors.resize(2);
@@ -93,6 +103,12 @@ TEST(ObstacleSurfaces, OfEndEffectorsThatCollideAreThereToo) {
   scene.end_effectors[1].collides = true;
   ASSERT_EQ(obstacle_surfaces(scene, 1, kAbout).size(), 1u);
   EXPECT_NEAR(obstacle_surfaces(scene, 1, kAbout)[0].vertices.col(2).mean(), 2, 1e-12);
+  scene.end_effectors[1].name = "hand";
+  scene.obstacles.push_back({"table", ScenePlane{}, {}});
+  const std::vector<SceneObstacle> all = colliding(scene);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].name, "table");
+  EXPECT_EQ(all[1].name, "hand");
 }
 
 }  // namespace

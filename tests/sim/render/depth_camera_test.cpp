@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <vector>
 
 #include "data/files/error.h"
+#include "data/mesh/procedural_mesh.h"
 
 namespace flash::sim {
 namespace {
@@ -24,7 +26,7 @@ data::CameraIntrinsics small_camera() {
 
 SeenMesh seen(const data::TriangleMesh& mesh) {
   return {
-      .triangles = &mesh.triangles, .vertices = mesh.vertices.data(), .vertex_count = mesh.vertices.rows()};
+      .triangles = &mesh.triangles, .vertex_count = mesh.vertices.rows(), .vertices = {mesh.vertices.data()}};
 }
 
 /// Moeller and Trumbore 1997. `depth`: in units of the ray, infinity where it misses; `edge`: how far the
@@ -142,22 +144,22 @@ TEST(DepthCameras, PicturesOfAPlaneAreThoseOfItsEquationOnAnyNumberOfThreads) {
   plane.triangles << 0, 1, 2, 0, 2, 3;
   const data::CameraIntrinsics camera = small_camera();
   const std::size_t pixels = 64 * 48, size = 5;
+  const auto height = [](std::size_t picture) { return 0.01 * static_cast<double>(picture); };
   std::vector<Isometry3d> raised(size, Isometry3d::Identity()), cameras;
   for (std::size_t e = 0; e < size; ++e) {
-    raised[e].translation().z() = 0.01 * static_cast<double>(e);
+    raised[e].translation().z() = height(e);
     Isometry3d pose(Eigen::AngleAxisd(3.14159 - 0.4 - 0.1 * static_cast<double>(e), Vector3d::UnitX()));
     pose.translation() = Vector3d(0.1, 0.2, 0.8);
     cameras.push_back(pose);
   }
   SeenMesh mesh = seen(plane);
   mesh.base_from_mesh = raised;
-  const std::vector<int> environments = {3, 0, 4, 1, 2};
   const auto pictures = [&](int threads) {
     std::vector<float> numbers(5 * pixels * size, -1);
     std::vector<std::uint8_t> instance(pixels * size);
     std::vector<std::int32_t> triangle(pixels * size);
     float* from = numbers.data();
-    render(camera, cameras, {&mesh, 1}, environments,
+    render(camera, cameras, {&mesh, 1},
            {from, from + pixels * size, instance.data(), triangle.data(), from + 2 * pixels * size}, threads);
     for (std::size_t i = 0; i < triangle.size(); ++i) {
       numbers.push_back(static_cast<float>(instance[i]));
@@ -172,8 +174,7 @@ TEST(DepthCameras, PicturesOfAPlaneAreThoseOfItsEquationOnAnyNumberOfThreads) {
     for (std::size_t k = 0; k < pixels; ++k) {
       const Vector3d ray((static_cast<double>(k % 64) - camera.cx) / camera.fx,
                          (static_cast<double>(k / 64) - camera.cy) / camera.fy, 1);
-      const double height = 0.01 * environments[i];
-      const double depth = (height - cameras[i].translation().z()) / (cameras[i].linear() * ray).z();
+      const double depth = (height(i) - cameras[i].translation().z()) / (cameras[i].linear() * ray).z();
       const Vector3d point = cameras[i] * (depth * ray).eval();
       const bool met = depth > 0 && point.head<2>().cwiseAbs().maxCoeff() < 9;
       const std::size_t pixel = i * pixels + k;
@@ -197,10 +198,76 @@ TEST(DepthCameras, ACornerThatIsNoNumberHidesItsTrianglesAlone) {
   }
 }
 
+TEST(DepthCameras, MeshesHaveAShapeForEachPictureOrOneForAll) {
+  data::TriangleMesh near{data::Points(3, 3), data::Triangles(1, 3)};
+  near.vertices << -9, -9, 1, 9, -9, 1, 0, 9, 1;
+  near.triangles << 0, 1, 2;
+  data::TriangleMesh far = near;
+  far.vertices.col(2).setConstant(2);
+  const std::vector<Isometry3d> cameras(2, Isometry3d::Identity());
+  const data::CameraIntrinsics camera = small_camera();
+  SeenMesh changing = seen(near), hidden;
+  changing.vertices.push_back(far.vertices.data());
+  std::vector<float> depth(2 * 64 * 48);
+  std::vector<std::uint8_t> instance(depth.size());
+  const DepthPictures pictures{.depth = depth.data(), .instance = instance.data()};
+  render(camera, cameras, std::vector{hidden, changing}, pictures, 1);
+  EXPECT_FLOAT_EQ(depth.front(), 1);
+  EXPECT_FLOAT_EQ(depth.back(), 2);
+  EXPECT_EQ(instance.back(), 1);  // the hidden one keeps its number
+  changing.vertices.push_back(far.vertices.data());
+  EXPECT_THROW(render(camera, cameras, {&changing, 1}, pictures, 1), data::InputError);
+  changing = seen(near);
+  changing.base_from_mesh.resize(3, Isometry3d::Identity());
+  EXPECT_THROW(render(camera, cameras, {&changing, 1}, pictures, 1), data::InputError);
+}
+
+/// A sheet of many triangles at a depth below a plane, seen from any side: it shows as deep as the plane
+/// yields.
+TEST(DepthCameras, WhatLiesOnAPlaneThatYieldsShows) {
+  constexpr double yields = 2e-3;
+  data::TriangleMesh plane{data::Points(4, 3), data::Triangles(2, 3)};
+  plane.vertices << -9, -9, 0, 9, -9, 0, 9, 9, 0, -9, 9, 0;
+  plane.triangles << 0, 1, 2, 0, 2, 3;
+  data::TriangleMesh sheet = data::rectangle({.width = 0.5, .height = 0.5, .cells_x = 23, .cells_y = 23});
+  sheet.vertices.rowwise() -= Eigen::RowVector3d(0.25, 0.25, 0);
+  const Isometry3d turn(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()));
+  const auto turned = [&](data::TriangleMesh mesh) {
+    mesh.vertices = (mesh.vertices * turn.linear().transpose()).eval();
+    return mesh;
+  };
+  const data::TriangleMesh turned_plane = turned(plane);
+  for (const double tilt : {0.0, 0.5, 1.0, 1.4, 1.5})
+    for (const double depth : {-0.1, 0.0, 0.99 * yields, 1.01 * yields, 0.1}) {
+      data::TriangleMesh lower = sheet;
+      lower.vertices.col(2).array() -= depth;
+      lower = turned(lower);
+      SeenMesh below = seen(turned_plane), own = seen(lower);
+      below.yields = yields;
+      const Isometry3d camera = turn *
+                                Isometry3d(Eigen::AngleAxisd(std::numbers::pi - tilt, Vector3d::UnitX())) *
+                                Eigen::Translation3d(0, 0, -0.7);
+      const std::vector<PixelHit> alone = see(small_camera(), camera, {&own, 1});
+      const std::vector<PixelHit> hits = see(small_camera(), camera, std::vector{own, below});
+      const std::vector<PixelHit> turned_round = see(small_camera(), camera, std::vector{below, own});
+      for (std::size_t i = 0; i < hits.size(); ++i) {
+        const bool shows = alone[i].mesh == 0 && depth < yields;
+        EXPECT_EQ(hits[i].mesh == 0, shows) << tilt << ' ' << depth;
+        EXPECT_EQ(turned_round[i].mesh == 1, shows);
+        if (shows) {
+          EXPECT_EQ(hits[i].inverse_depth, alone[i].inverse_depth);  // where it is, not where the plane is
+        }
+      }
+    }
+}
+
 TEST(DepthCameras, RefuseWhatIsNoCamera) {
   const Isometry3d pose = Isometry3d::Identity();
   data::CameraIntrinsics camera = small_camera();
   camera.fx = 0;
+  EXPECT_THROW(see(camera, pose, {}), data::InputError);
+  camera = small_camera();
+  camera.cy = std::nan("");
   EXPECT_THROW(see(camera, pose, {}), data::InputError);
   camera = small_camera();
   camera.height = 0;

@@ -1,0 +1,83 @@
+#include "python/bindings/cameras.h"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "python/bindings/arrays.h"
+
+namespace flash::python {
+
+namespace nb = nanobind;
+using sim::LiveScene;
+
+namespace {
+
+/// Where a picture is written; Python has looked at its shape.
+template <class Number>
+using Picture = std::optional<nb::ndarray<Number, nb::c_contig, nb::device::cpu>>;
+
+template <class Number>
+Number* start_of(const Picture<Number>& picture) {
+  return picture ? picture->data() : nullptr;
+}
+
+sim::LiveCamera camera_of(const std::string& name, const std::array<int, 2>& size,
+                          const std::array<double, 4>& lens, const std::string& carrier,
+                          const std::vector<std::string>& sees) {
+  sim::LiveCamera camera{.name = name, .lens = {}, .carrier = carrier, .sees = sees};
+  camera.lens.width = size[0], camera.lens.height = size[1];
+  camera.lens.fx = lens[0], camera.lens.fy = lens[1];
+  camera.lens.cx = lens[2], camera.lens.cy = lens[3];
+  return camera;
+}
+
+}  // namespace
+
+void bind_cameras(nb::class_<Simulation>& simulation) {
+  simulation.def("cameras",
+                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.cameras(); }); });
+  simulation.def("instances",
+                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.instances(); }); });
+  simulation.def("camera_size", [](Simulation& s, const std::string& name) {
+    return s.use([&](LiveScene& live) {
+      const data::CameraIntrinsics& lens = live.camera(name).lens;
+      return std::array<int, 2>{lens.width, lens.height};
+    });
+  });
+  simulation.def("add_camera", [](Simulation& s, const std::string& name, const std::array<int, 2>& size,
+                                  const std::array<double, 4>& lens, const Numbers& poses,
+                                  const std::string& carrier, const std::vector<std::string>& sees) {
+    s.use([&](LiveScene& live) {
+      live.add_camera(camera_of(name, size, lens, carrier, sees), tensor_of(poses));
+    });
+  });
+  simulation.def("set_camera", [](Simulation& s, const std::string& name,
+                                  const std::vector<int>& environments, const Numbers& poses) {
+    s.use([&](LiveScene& live) { live.set_camera(name, environments, tensor_of(poses)); });
+  });
+  simulation.def(
+      "render",
+      [](Simulation& s, const std::string& name, const std::vector<int>& environments,
+         const Picture<float>& depth, const Picture<float>& distance, const Picture<std::uint8_t>& instance,
+         const Picture<std::int32_t>& triangle, const Picture<float>& points) {
+        s.use([&](LiveScene& live) {
+          const nb::gil_scoped_release release;
+          live.render(name, environments,
+                      {start_of(depth), start_of(distance), start_of(instance), start_of(triangle),
+                       start_of(points)});
+        });
+      },
+      nb::arg("camera"), nb::arg("environments"), nb::arg("depth").none(), nb::arg("distance").none(),
+      nb::arg("instance").none(), nb::arg("triangle").none(), nb::arg("points").none());
+}
+
+}  // namespace flash::python

@@ -1,0 +1,105 @@
+"""Depth cameras: what their pictures hold, and where they stand."""
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flash_sim import arguments
+
+# Of each picture the type of its numbers and the length of a pixel's; () is one number.
+PICTURES = {"depth": (np.float32, ()), "distance": (np.float32, ()), "instance": (np.uint8, ()), "triangle": (np.int32, ()),
+            "points": (np.float32, (3,))}
+NOTHING = 255  # the instance of a pixel that sees nothing
+
+
+def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> np.ndarray:
+    """Poses of cameras at `position` whose optical axis goes through `target`, with pictures upright against `up`.
+
+    Each is (3,) or (n, 3) [m], in the base frame. Returns (7,) or (n, 7): x y z qx qy qz qw of the optical frame, x right,
+    y down, z forward. A camera that looks straight along `up` has the x axis, or else the y axis, of the base for its right.
+    """
+    position, target, up = (arguments.numbers(f"look_at: {name}", value, (3,), (None, 3))
+                            for name, value in (("position", position), ("target", target), ("up", up)))
+    try:
+        rows = np.broadcast_arrays(*map(np.atleast_2d, (position, target, up)))
+    except ValueError:
+        raise ValueError(f"look_at: found {position.shape}, {target.shape} and {up.shape}, "
+                         "expected one row or as many of each") from None
+    forward = _unit("look_at: target", rows[1] - rows[0])
+    right = np.cross(forward, _unit("look_at: up", rows[2]))
+    along = np.linalg.norm(right, axis=1) < 1e-9
+    for axis in np.eye(3)[:2]:
+        right[along] = axis - forward[along] * (forward[along] @ axis)[:, None]
+        along &= np.linalg.norm(right, axis=1) < 0.5
+    right = _unit("look_at: up", right)
+    poses = np.concatenate([rows[0], quaternions(np.stack([right, np.cross(forward, right), forward], axis=2))], axis=1)
+    return poses if max(position.ndim, target.ndim, up.ndim) == 2 else poses[0]
+
+
+def quaternions(rotations: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) to (n, 4), qx qy qz qw (Shepperd 1978: by the largest of the four)."""
+    r = rotations
+    diagonal = np.stack([r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]], axis=1)
+    trace = diagonal.sum(axis=1)
+    # Rows of 4 q q^T - identity, of which the longest is the most exact.
+    products = np.empty((len(r), 4, 4))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        products[:, i, i] = 1 + 2 * diagonal[:, i] - trace
+        products[:, i, j] = products[:, j, i] = r[:, i, j] + r[:, j, i]
+        products[:, i, 3] = products[:, 3, i] = r[:, k, j] - r[:, j, k]
+    products[:, 3, 3] = 1 + trace
+    longest = products[np.arange(len(r)), np.argmax(np.einsum("nii->ni", products), axis=1)]
+    return longest / np.linalg.norm(longest, axis=1, keepdims=True)
+
+
+def poses(what: str, value: ArrayLike, count: int) -> np.ndarray:
+    """(count, 7) of what may be (7,), (count, 7), or matrices (4, 4), (count, 4, 4), which have to be rigid."""
+    given = arguments.numbers(what, value, (7,), (count, 7), (4, 4), (count, 4, 4))
+    if given.shape[-1] == 7:
+        no_turn = np.tile([0.0, 0, 0, 0, 0, 0, 1], (count, 1))
+        return arguments.poses(what, given, no_turn)
+    matrices = np.array(np.broadcast_to(given, (count, 4, 4)))
+    turns = matrices[:, :3, :3]
+    error = np.abs(np.swapaxes(turns, 1, 2) @ turns - np.eye(3)).max(axis=(1, 2))
+    rigid = (error <= arguments.UNIT_TOLERANCE) & (np.linalg.det(turns) > 0) & (matrices[:, 3] == [0, 0, 0, 1]).all(axis=1)
+    if not rigid.all():
+        raise ValueError(f"{what}: found a matrix that is not rigid in row {np.flatnonzero(~rigid)[0]}, "
+                         "expected a rotation, a place and the last row 0 0 0 1")
+    return np.concatenate([matrices[:, :3, 3], quaternions(turns)], axis=1)
+
+
+def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None) -> dict[str, np.ndarray]:
+    """Arrays for the pictures of these names: those of `out`, or new ones."""
+    if out is not None:
+        if names is not None:
+            raise ValueError(f"{what}: found pictures and out, expected one of them: out names its pictures")
+        if not isinstance(out, dict) or not out:
+            raise TypeError(f"{what}: out: found {type(out).__name__}, expected a dict of arrays by the name of the picture")
+        return {name: _given(f"{what}: out", name, array, shape) for name, array in out.items()}
+    names = ("depth", "instance") if names is None else (names,) if isinstance(names, str) else names
+    try:
+        names = list(names)
+    except TypeError:
+        raise TypeError(f"{what}: pictures: found {type(names).__name__}, expected names of pictures") from None
+    for name in names:
+        arguments.one_of(f"{what}: pictures", name, list(PICTURES))
+    return {name: np.empty(shape + PICTURES[name][1], PICTURES[name][0]) for name in names}
+
+
+def _given(what, name, array, shape):
+    arguments.one_of(what, name, list(PICTURES))
+    kind, pixel = PICTURES[name]
+    if not isinstance(array, np.ndarray) or array.dtype != kind:
+        found = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
+        raise TypeError(f"{what}: {name}: found {found}, expected an array of {np.dtype(kind)}")
+    if array.shape != shape + pixel:
+        raise ValueError(f"{what}: {name}: found the shape {array.shape}, expected {shape + pixel}")
+    if not array.flags.c_contiguous or not array.flags.writeable:
+        raise ValueError(f"{what}: {name}: found an array that is strided or read-only, expected a dense one to write to")
+    return array
+
+
+def _unit(what, rows):
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    if not (length > 0).all():
+        raise ValueError(f"{what}: found no direction in row {int(np.argmin(length))}, expected one")
+    return rows / length
