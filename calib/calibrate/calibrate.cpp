@@ -331,14 +331,8 @@ void warn(Calibration& result) {
   if (missing > 0) {
     std::string sentence = std::to_string(missing) + " of " + std::to_string(result.views.size()) +
                            (missing == 1 ? " views was not used" : " views were not used");
-    const auto misfits = std::count_if(result.selection.views.begin(), result.selection.views.end(),
-                                       [](const ViewVerdict& view) { return !view.used && view.misfit; });
-    constexpr std::ptrdiff_t kBlunders = 10;  // one view in so many is a slip now and then
-    if (misfits > 1 && misfits * kBlunders > std::ssize(result.views))
-      sentence +=
-          ", too many for slips: pictures of other poses, or good views lost by an arm whose model is wrong; "
-          "then the stated deviations are too small";
-    result.warnings.push_back(std::move(sentence));
+    const std::string misfits = misfit_sentence(result.selection);
+    result.warnings.push_back(misfits.empty() ? sentence : sentence + ": " + misfits);
   }
   if (result.selection.renumbered > 0)
     result.warnings.push_back(std::to_string(result.selection.renumbered) +
