@@ -20,7 +20,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
+.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test configure-test format check-format check-includes tidy
 .PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
@@ -105,6 +105,10 @@ answer-time: configure-test  ## Say how long it takes from kept motions to the a
 size-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly, over 200 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target size_study
 	$(BUILD)/tests/size_study
+
+lens-study: configure-test  ## Say whether hand-eye calibration states truly how well it knows its lens, and what another recording differs by, over 60 fresh rigs of each kind
+	cmake --build $(BUILD) -j $(JOBS) --target lens_study
+	$(BUILD)/tests/lens_study
 
 use-study: configure-test  ## Say what each use of a hand-eye calibration (--for) gains, over 100 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target use_study

@@ -15,6 +15,7 @@
 #include "calib/calibrate/calibrate_pairs.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/opencv_closed_forms.h"
+#include "calib/dataset/told_shape.h"
 #include "calib/detect/lens_doubt.h"
 #include "calib/detect/read_depth.h"
 #include "calib/report/extrinsics_export.h"
@@ -121,13 +122,10 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
               1e3 * extrinsics.robot_translation_m);
   if (extrinsics.pixels) {
     print_lens(c);
-    const calib::Warp warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
-    std::printf(
-        "target: %.4f +- %.4f times as large as stated, its middle %s +- %.2f and %s +- %.2f mm behind "
-        "its ends along x and y, twisted by %s +- %.2f mm\n",
-        c.size->estimate, c.size->sd, fixed(warp.x(), 2).c_str(), warp_sd.x(), fixed(warp.y(), 2).c_str(),
-        warp_sd.y(), fixed(warp.z(), 2).c_str(), warp_sd.z());
-    if (c.edges) std::printf("%s\n", calib::describe(*c.edges).c_str());
+    const std::string warp = calib::describe(c.warp);
+    std::printf("target: %.4f +- %.4f times as large as stated%s\n", c.size->estimate, c.size->sd,
+                warp.empty() ? "" : (", " + warp).c_str());
+    if (c.edges && calib::told(*c.edges)) std::printf("%s\n", calib::describe(*c.edges).c_str());
   } else if (c.size && c.size->sd > 0) {
     std::printf("target: %.4f +- %.4f times as large as stated\n", c.size->estimate, c.size->sd);
   }

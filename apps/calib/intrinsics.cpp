@@ -8,6 +8,7 @@
 #include "apps/command_line/command_line.h"
 #include "apps/command_line/result_files.h"
 #include "calib/dataset/lens_file.h"
+#include "calib/dataset/told_shape.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/grey_image.h"
 #include "calib/detect/intrinsics.h"
@@ -65,12 +66,10 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
   const calib::IntrinsicsVector values = calib::to_vector(estimate.camera);
   for (Eigen::Index i = 0; i < 4 + static_cast<Eigen::Index>(estimate.camera.distortion.size()); ++i)
     std::printf("%-3s %12.5g  +- %.2g%s\n", kNames[i], values[i], estimate.sd[i], i < 4 ? " px" : "");
-  const calib::Warp warp = 1e3 * estimate.warp.estimate, sd = 1e3 * estimate.warp.sd;
-  std::printf(
-      "target: its middle %.2f +- %.2f and %.2f +- %.2f mm behind its ends along x and y, twisted by %.2f +- "
-      "%.2f mm\n",
-      warp.x(), sd.x(), warp.y(), sd.y(), warp.z(), sd.z());
-  if (estimate.edges) std::printf("%s\n", calib::describe(*estimate.edges).c_str());
+  const std::string warp = calib::describe(estimate.warp);
+  if (!warp.empty()) std::printf("target: %s\n", warp.c_str());
+  if (estimate.edges && calib::told(*estimate.edges))
+    std::printf("%s\n", calib::describe(*estimate.edges).c_str());
   std::printf("%.3f px rms a corner; places at the picture's corners known to %.2g px%s\n", estimate.rms,
               estimate.corner_sd, estimate.corner_sd < calib::most_corner_sd ? "" : ", or not at all");
 }

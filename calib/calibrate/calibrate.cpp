@@ -11,6 +11,7 @@
 #include "calib/calibrate/misfit_views.h"
 #include "calib/calibrate/moving_rig.h"
 #include "calib/calibrate/plausibility.h"
+#include "calib/calibrate/stated_uncertainty.h"
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
 #include "calib/uncertainty/lone_view.h"
@@ -172,50 +173,6 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
   }
 }
 
-/// What errors that change smoothly with the robot's pose share comes on top of noise. Returns by how much
-/// the variances have grown in the mean.
-double add_systematic(Calibration& result, const SystematicUncertainty& systematic) {
-  const CorrelatedPoseErrors& errors = result.pose_errors.emplace(systematic.arms.front());
-  const Matrix6d noise = result.refined.covariance.topLeftCorner<6, 6>();
-  result.shared_covariance = systematic.covariance;
-  result.covariance = systematic.covariance.topLeftCorner<6, 6>();
-  result.repeatable = noise;
-  const double grown = std::max(1.0, noise.ldlt().solve(result.covariance).trace() / 6);
-  if (!errors.found) return grown;
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "the robot's errors change smoothly with its pose, as those of a kinematic model or a lens do: "
-      "the part common to all views cannot be observed, so its estimated size was added to the stated "
-      "standard deviations, which it raised by a factor of %.1f",
-      std::sqrt(grown));
-  result.warnings.emplace_back(text);
-  return grown;
-}
-
-/// Halves of few views determine too little by themselves. grown: what has been added for errors that halves
-/// by place would show as well.
-void check_splits(Calibration& result, const BundleSettings& settings, const CalibrateSettings& calibrate,
-                  double grown) {
-  if (result.used.size() < 4 * static_cast<std::size_t>(calibrate.least_views)) return;
-  const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings, 0, calibrate.threads);
-  result.splits = {check_halves(result.refined, settings, Split::interleaved)};
-  result.splits.insert(result.splits.end(), systematic.begin(), systematic.end());
-  const SplitCheck* worst = nullptr;
-  result.covariance_factor = split_inflation(systematic, &worst);
-  result.covariance_factor = std::max(1.0, result.covariance_factor / grown);
-  if (worst == nullptr || result.covariance_factor == 1) return;
-  result.covariance *= result.covariance_factor;
-  char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "%s differ by %.1f mm and %.2f deg, more than noise explains: drift, or errors that depend on "
-      "the pose; the stated standard deviations were raised by %.1f",
-      describe(worst->split).c_str(), 1e3 * worst->apart.head<3>().norm(),
-      worst->apart.tail<3>().norm() / kDegree, std::sqrt(result.covariance_factor));
-  result.warnings.emplace_back(text);
-}
-
 /// Where an answer is none although most views close: the reading that explains them, if there is one.
 std::optional<std::string> cause_of(const Calibration& result, const std::vector<Observation>& all,
                                     const std::vector<Symmetry>& symmetries,
@@ -331,14 +288,8 @@ void warn(Calibration& result) {
   if (missing > 0) {
     std::string sentence = std::to_string(missing) + " of " + std::to_string(result.views.size()) +
                            (missing == 1 ? " views was not used" : " views were not used");
-    const auto misfits = std::count_if(result.selection.views.begin(), result.selection.views.end(),
-                                       [](const ViewVerdict& view) { return !view.used && view.misfit; });
-    constexpr std::ptrdiff_t kBlunders = 10;  // one view in so many is a slip now and then
-    if (misfits > 1 && misfits * kBlunders > std::ssize(result.views))
-      sentence +=
-          ", too many for slips: pictures of other poses, or good views lost by an arm whose model is wrong; "
-          "then the stated deviations are too small";
-    result.warnings.push_back(std::move(sentence));
+    const std::string misfits = misfit_sentence(result.selection);
+    result.warnings.push_back(misfits.empty() ? sentence : sentence + ": " + misfits);
   }
   if (result.selection.renumbered > 0)
     result.warnings.push_back(std::to_string(result.selection.renumbered) +
@@ -436,7 +387,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.corner_rms = reprojection_rms(bundle, true);
   result.chain_rms = result.comparison.back().px;
   result.centre_rms = centre_rms(answer_of(result), camera, target_poses(observations));
-  const double grown = add_systematic(result, sized.systematic);
+  add_uncertainty(result, sized.systematic, refine_settings.bundle);
   if (result.method == Method::pixels) {
     result.covariance = pixels->covariance;
     result.repeatable = pixels->repeatable;
@@ -447,7 +398,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.edges = edge_estimate(bundle, result.unknowns, result.shared_covariance);
   if (settings.lens != given.lens)
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
-  check_splits(result, refine_settings.bundle, settings, grown);
+  check_parts(result, refine_settings.bundle, settings);
   warn_of_lone_view(result, refine_settings.bundle, usual_distance(observations));
   const bool plausible = finish(result, observations);
   // Who keeps a size is answered, however far off it may be.

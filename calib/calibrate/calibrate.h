@@ -62,10 +62,12 @@ struct Calibration {
   Refinement refined;
   HandEyePoses poses;
   Matrix6d covariance = Matrix6d::Zero();         ///< of X, right perturbation (dt, dtheta)
-  Matrix6d repeatable = covariance;               ///< of independent errors alone
+  Matrix6d repeatable = covariance;               ///< of what scatters alone
   Matrix6d motion_covariance = Matrix6d::Zero();  ///< what both hold of camera or target that may have moved
   Method method = Method::errors_in_variables;    ///< that the poses are of: that, or pixels
   LensEstimate lens;
+  double lens_view_factor =
+      1;  ///< of the variances of lens and print, which views that disagree raised by it
   WarpEstimate warp;
   std::optional<EdgeOffset> edges;    ///< of a target with corners of edges
   Unknowns unknowns;                  ///< of the solution

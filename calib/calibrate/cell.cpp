@@ -9,6 +9,7 @@
 
 #include "calib/calibrate/cell_check.h"
 #include "calib/solve/linearization.h"
+#include "calib/uncertainty/view_disagreement.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
 
@@ -253,6 +254,8 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
       cell.notices.push_back(size_sentence(size));
   }
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
+  systematic.covariance =
+      with_lens_raised(systematic.covariance, columns, lens_disagreement(refined, settings.bundle));
   for (std::size_t c = 0; c < refined.bundle.cameras.size(); ++c) {
     cell.lenses.push_back(lens_estimate(refined.bundle, settings.bundle.unknowns, systematic.covariance, c));
     if (!cell.lenses.back().far_off.empty()) cell.notices.push_back(lens_sentence(cell.lenses.back()));

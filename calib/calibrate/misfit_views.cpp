@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/calibrate/plausibility.h"
 #include "calib/uncertainty/motion_in_time.h"
 #include "data/numbers/chi_square.h"
 #include "data/numbers/median.h"
@@ -34,6 +35,28 @@ std::vector<double> squared_corrections(const Refinement& refined) {
 double tail_of_f6(double f, double dof) {
   const double a = 0.5 * dof, x = dof / (dof + 6 * f), y = 1 - x;
   return std::pow(x, a) * (1 + a * y + 0.5 * a * (a + 1) * y * y);
+}
+
+std::string counted(std::ptrdiff_t count, const char* one, const char* more) {
+  return std::to_string(count) + (count == 1 ? one : more);
+}
+
+/// How the views in use close, in the middle.
+ClosingError usual_error(const std::vector<ViewVerdict>& views) {
+  std::vector<double> rotations, translations;
+  for (const ViewVerdict& view : views) {
+    if (!view.used) continue;
+    rotations.push_back(view.error.rotation);
+    translations.push_back(view.error.translation);
+  }
+  return {data::median(rotations), data::median(translations)};
+}
+
+/// The picture belongs to another pose: the view closes worse than is usual by what no arm errs.
+bool of_another_pose(const ClosingError& error, const ClosingError& usual) {
+  const ArmNoise arm;
+  return error.translation - usual.translation > std::sqrt(3) * arm.doubtful_m ||
+         error.rotation - usual.rotation > std::sqrt(3) * arm.doubtful_rad;
 }
 
 }  // namespace
@@ -87,6 +110,31 @@ bool readmit(Calibration& result, std::vector<Observation>& observations, const 
   }
   if (any) observations = used_observations(result.selection, &result.used);
   return any;
+}
+
+std::string misfit_sentence(const ViewSelection& selection) {
+  constexpr std::ptrdiff_t kBlunders = 10;  // one view in so many is a slip now and then
+  const ClosingError usual = usual_error(selection.views);
+  std::ptrdiff_t misfits = 0, others = 0;
+  for (const ViewVerdict& view : selection.views) {
+    if (view.used || !view.misfit) continue;
+    ++misfits;
+    others += of_another_pose(view.error, usual);
+  }
+  if (misfits < 2 || misfits * kBlunders <= std::ssize(selection.views)) return {};
+  std::string text;
+  if (others > 0)
+    text = counted(
+        others,
+        " view is off by more than any arm errs: its picture belongs to another pose, or its pose is wrong",
+        " views are off by more than any arm errs: their pictures belong to other poses, or their poses are "
+        "wrong");
+  if (misfits > others)
+    text += (others > 0 ? "; " : "") +
+            counted(misfits - others, " view is off by little, and may be a good one",
+                    " views are off by little: too many for slips, and perhaps good views") +
+            " that an arm whose model is wrong has lost; then the stated deviations are too small";
+  return text;
 }
 
 }  // namespace flash::calib

@@ -1,4 +1,6 @@
 #pragma once
+#include <string>
+
 #include "calib/calibrate/calibrate.h"
 
 namespace flash::calib {
@@ -14,5 +16,10 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
 /// numbers, Bonferroni). False where there is none.
 bool readmit(Calibration& result, std::vector<Observation>& observations, const Eigen::Matrix3Xd& points,
              const BundleSettings& settings);
+
+/// What it means that so many views do not fit: empty where they are few enough for slips, one in ten. Views
+/// that are off by more than any arm errs (ArmNoise) show the target from other poses; the rest may be good
+/// views, lost by an arm whose model is wrong.
+std::string misfit_sentence(const ViewSelection& selection);
 
 }  // namespace flash::calib

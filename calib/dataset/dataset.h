@@ -53,11 +53,11 @@ struct DatasetOptions {
 /// A folder with images/ (or rgb/, color/, img/, or the pictures themselves; jpg, png or bmp, sorted), poses
 /// as a list (poses.tum, .csv, .txt, .json) or one a file (poses/*.yaml or *.txt, pose*.yaml or *.txt),
 /// intrinsics (load_intrinsics), target.json, and depth/ with pictures of depth of the same names
-/// (data::load_depth). Or a set of pairs: a .samples or pose_samples.json file, or a folder with one; beside
-/// pictures its robot poses count. Pictures pair with poses by file name, by the last number in it, by their
-/// order where poses have neither, or by time: where stamps are times, the pose is interpolated within
-/// `stream`. A picture without a pose is left out. Throws InputError: nothing found, two sources of poses, no
-/// picture with a pose.
+/// (data::load_depth). Or a set of pairs: a .samples, pose_samples.json or .npz file, or a folder with one of
+/// the first two; beside pictures its robot poses count. Pictures pair with poses by file name, by the last
+/// number in it, by their order where poses have neither, or by time: where stamps are times, the pose is
+/// interpolated within `stream`. A picture without a pose is left out. Throws InputError: nothing found, two
+/// sources of poses, no picture with a pose.
 Dataset load_dataset(const std::string& path, const DatasetOptions& options = {});
 
 /// Observations of a set of pairs: poses, no points.

@@ -1,7 +1,8 @@
 #include "calib/dataset/target_shape.h"
 
 #include <cmath>
-#include <cstdio>
+
+#include "calib/dataset/told_shape.h"
 
 namespace flash::calib {
 namespace {
@@ -45,15 +46,8 @@ bool WarpEstimate::far_off() const {
 }
 
 std::string warp_sentence(const WarpEstimate& warp) {
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "the target is not flat: its middle stands %.1f +- %.1f mm (2 sd) behind its ends along x, %.1f +- "
-      "%.1f mm along y, and its corners by %.1f +- %.1f mm before and behind by turns; the answer takes it "
-      "into account, a flat target needs no such guess",
-      1e3 * warp.estimate.x(), 2e3 * warp.sd.x(), 1e3 * warp.estimate.y(), 2e3 * warp.sd.y(),
-      1e3 * warp.estimate.z(), 2e3 * warp.sd.z());
-  return text;
+  return "the target is not flat: " + describe(warp, 2) +
+         " (2 sd); the answer takes it into account, a flat target needs no such guess";
 }
 
 }  // namespace flash::calib

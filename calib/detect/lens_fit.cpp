@@ -7,6 +7,7 @@
 #include "calib/dataset/edge_offset.h"
 #include "calib/dataset/target_shape.h"
 #include "calib/geometry/pose.h"
+#include "data/numbers/jackknife.h"
 
 namespace flash::calib {
 namespace {
@@ -59,31 +60,6 @@ double squares(const LensFit& fit, const Eigen::Matrix3Xd& points,
   return sum;
 }
 
-/// Of one view, with its pose eliminated.
-struct ReducedTerms {
-  Eigen::MatrixXd information;
-  Eigen::VectorXd gradient;
-};
-
-/// By how much the unknowns scatter more than `covariance` says as one view after the other is left out: the
-/// mean over their directions, at least 1. information: of all views and the priors, over `covariance`.
-double view_factor(const std::vector<ReducedTerms>& views, const Eigen::MatrixXd& information,
-                   const Eigen::MatrixXd& covariance) {
-  const double count = static_cast<double>(views.size());
-  std::vector<Eigen::VectorXd> shifts;
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(information.rows());
-  for (const ReducedTerms& view : views) {
-    const Eigen::LDLT<Eigen::MatrixXd> others(information - view.information);
-    if (!others.isPositive()) return 1;  // without it nothing is known: it cannot be compared
-    shifts.push_back(others.solve(view.gradient));
-    mean += shifts.back() / count;
-  }
-  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(information.rows(), information.cols());
-  for (const Eigen::VectorXd& shift : shifts) scatter += (shift - mean) * (shift - mean).transpose();
-  scatter *= (count - 1) / count;
-  return std::max(1.0, covariance.ldlt().solve(scatter).trace() / static_cast<double>(information.rows()));
-}
-
 }  // namespace
 
 Eigen::Matrix2Xd residuals(const LensFit& fit, std::size_t view, const Eigen::Matrix3Xd& points,
@@ -120,7 +96,7 @@ LensFit fit_lens(LensFit fit, const std::vector<int>& unknowns, const Eigen::Mat
     reduced.bottomRightCorner<kExtra, kExtra>().diagonal() = prior;
     gradient.tail<kExtra>() = prior.cwiseProduct(extra(fit));
     std::vector<ViewTerms> terms;
-    std::vector<ReducedTerms> of_views;
+    std::vector<data::GroupTerms> of_views;  // their poses eliminated
     for (std::size_t v = 0; v < views.size(); ++v) {
       const ViewTerms& own = terms.emplace_back(terms_of(fit, v, unknowns, points, bows, *views[v]));
       const Eigen::LDLT<Matrix6d> pose(own.pose);
@@ -130,7 +106,7 @@ LensFit fit_lens(LensFit fit, const std::vector<int>& unknowns, const Eigen::Mat
       gradient += of_views.back().gradient;
     }
     fit.covariance = fit.variance * reduced.ldlt().solve(Eigen::MatrixXd::Identity(s, s));
-    fit.view_factor = view_factor(of_views, reduced, fit.covariance);
+    fit.view_factor = std::max(1.0, data::jackknife_factor(of_views, reduced, reduced) / fit.variance);
     fit.covariance *= fit.view_factor;
     Eigen::MatrixXd damped = reduced;
     damped.diagonal() *= 1 + damping;

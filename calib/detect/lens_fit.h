@@ -26,9 +26,8 @@ struct LensFit {
 /// (usual_warp_sd, kUsualEdgeOffset).
 ///
 /// Corners of one view share errors that no corner shows: of the print, of light and blur, of the lens's
-/// model. So the covariance is raised by the mean over the unknowns of what leaving out one view at a time
-/// says (the jackknife, of one step of Newton: MacKinnon and White 1985, grouped by views), over what corners
-/// say; by nothing where that is less.
+/// model. So the covariance is raised by how much views disagree beyond their corners
+/// (data::jackknife_factor).
 LensFit fit_lens(LensFit start, const std::vector<int>& unknowns, const Eigen::Matrix3Xd& points,
                  const std::vector<const Observation*>& views);
 

@@ -174,6 +174,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                     {"size_px", {lens.width, lens.height}}};
     json["lens"].update(lens_json(lens));
     json["lens"]["sd"] = list(Eigen::VectorXd(calibration.lens.sd.head(kLensUnknowns)));
+    json["lens"]["sd_factor_of_views"] = std::sqrt(calibration.lens_view_factor);
     json["lens"]["stated"] = lens_json(stated);
     const Vector6d& shift = calibration.lens.camera_shift;
     json["lens"]["camera_shift_mm"] = list(Eigen::Vector3d(1e3 * shift.head<3>()));

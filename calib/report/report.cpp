@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string_view>
 
+#include "calib/dataset/told_shape.h"
 #include "calib/detect/grey_image.h"
 #include "calib/geometry/chain.h"
 #include "calib/report/extrinsics_export.h"
@@ -209,6 +210,7 @@ std::string render_report(const Calibration& calibration, const Extrinsics& extr
   Json page = {{"extrinsics", json}, {"usable", calibration.usable}};
   page["sd_parent"] = sd_in_parent(calibration);
   page["next_steps"] = next_steps(calibration);
+  page["warp"] = describe(calibration.warp);
   page["views"] = views(calibration, seen);
   page["pictures"] = pictures(seen, inputs, settings);
   page["magnified"] = settings.picture.magnified;

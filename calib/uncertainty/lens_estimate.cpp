@@ -1,8 +1,10 @@
 #include "calib/uncertainty/lens_estimate.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 
 #include "calib/solve/linearization.h"
 
@@ -57,8 +59,12 @@ bool exceeds_deviations(const Eigen::Isometry3d& X, const Vector6d& motion, cons
 }
 
 std::string lens_differs(const LensEstimate& lens) {
+  // What is known together is far off together; each number that pictures leave as it was is not named.
+  std::vector<int> named;
+  std::copy_if(lens.far_off.begin(), lens.far_off.end(), std::back_inserter(named),
+               [&](int i) { return std::abs(lens.estimate[i] - lens.stated[i]) > 2 * lens.sd[i]; });
   std::string text = "the lens is not as stated:";
-  for (const int i : lens.far_off) {
+  for (const int i : named.empty() ? lens.far_off : named) {
     char part[100];
     std::snprintf(part, sizeof part,
                   i < 4 ? " %s %.1f +- %.1f, stated %.1f;" : " %s %.3f +- %.3f, stated %.3f;",

@@ -45,7 +45,7 @@ class NamedValues {
  public:
   explicit NamedValues(const std::string& path) : path_(path) {
     if (lower_extension(path) == ".npz")
-      for (const auto& [name, numbers] : load_npz(path)) numbers_.emplace(plain(name), numbers);
+      for (const auto& [name, array] : load_npz(path)) numbers_.emplace(plain(name), array.values);
     else
       add(load_yaml(path));  // JSON is YAML
   }

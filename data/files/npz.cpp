@@ -74,6 +74,7 @@ NumpyArray array_of(std::string_view npy) {
   if (type == "<u2") values = converted<std::uint16_t>(bytes);
   array.whole = !type.empty() && type.size() == 3 && type[1] != 'f';
   const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
+  if (columns_first && array.shape.size() > 2) values.clear();
   if (columns_first && array.shape.size() == 2 && values.size() == count_of(array.shape)) {
     const std::size_t rows = array.shape[0], columns = array.shape[1];
     const std::vector<double> stored = values;
@@ -84,11 +85,11 @@ NumpyArray array_of(std::string_view npy) {
 
 }  // namespace
 
-std::map<std::string, std::vector<double>> load_npz(const std::string& path) {
+std::map<std::string, NumpyArray> load_npz(const std::string& path) {
   const std::string file = read_file(path);
   const std::size_t end = file.rfind("PK\x05\x06");
   if (end == std::string::npos) throw InputError(path + ": no .npz: found no table of contents");
-  std::map<std::string, std::vector<double>> arrays;
+  std::map<std::string, NumpyArray> arrays;
   std::size_t entry = at<std::uint32_t>(file, end + 16, path);
   const auto count = at<std::uint16_t>(file, end + 10, path);
   for (std::uint16_t i = 0; i < count; ++i) {
@@ -103,11 +104,11 @@ std::map<std::string, std::vector<double>> load_npz(const std::string& path) {
     if (name.ends_with(".npy")) name.resize(name.size() - 4);
     if (method != 0)
       throw InputError(path + ": " + name +
-                       " is compressed; write it with numpy.savez, or as camera_info.yaml");
+                       " is compressed; write it with numpy.savez");
     const std::size_t begin =
         local + 30 + at<std::uint16_t>(file, local + 26, path) + at<std::uint16_t>(file, local + 28, path);
     if (begin + size > file.size()) throw InputError(path + ": " + name + ": ends within its data");
-    arrays[name] = array_of(std::string_view(file).substr(begin, size)).values;
+    arrays[name] = array_of(std::string_view(file).substr(begin, size));
     entry += 46U + name_length + extra + comment;
   }
   return arrays;

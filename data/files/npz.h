@@ -6,16 +6,16 @@
 
 namespace flash::data {
 
-/// An array of real numbers as numpy writes it, row by row; empty of other things.
+/// An array of real numbers as numpy writes it, row by row; without values where it is of other things, or
+/// column by column in more than two dimensions.
 struct NumpyArray {
   std::vector<std::size_t> shape;
   std::vector<double> values;
   bool whole = false;  ///< of integers
 };
 
-/// The arrays of real numbers of an .npz as numpy.savez writes it (not compressed), row by row, by name.
-/// Throws InputError.
-std::map<std::string, std::vector<double>> load_npz(const std::string& path);
+/// The arrays of an .npz as numpy.savez writes it (not compressed), by name. Throws InputError.
+std::map<std::string, NumpyArray> load_npz(const std::string& path);
 
 /// One array, as numpy.save writes it. Throws InputError where the file holds none of real numbers, or not as
 /// many as its shape says.

@@ -10,6 +10,7 @@
 #include "data/files/yaml_file.h"
 #include "data/motion/bare_poses.h"
 #include "data/motion/pose_json.h"
+#include "data/motion/pose_npz.h"
 #include "data/motion/pose_numbers.h"
 #include "data/motion/pose_table.h"
 #include "data/motion/trajectory.h"
@@ -173,8 +174,10 @@ RecordedPose load_pose_yaml(const std::string& path) {
 }
 
 std::vector<PosePair> load_pose_pairs(const std::string& path) {
-  const std::vector<PosePair> pairs =
-      lower_extension(path) == ".json" ? load_json_pairs(path) : load_samples(path);
+  const std::string ending = lower_extension(path);
+  const std::vector<PosePair> pairs = ending == ".json"  ? load_json_pairs(path)
+                                      : ending == ".npz" ? load_npz_pairs(path)
+                                                         : load_samples(path);
   if (pairs.empty()) throw InputError(path + ": found no samples");
   std::vector<double> robot, tracking;
   for (const PosePair& pair : pairs) {

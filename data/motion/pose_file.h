@@ -48,7 +48,7 @@ Eigen::Isometry3d load_yaml_pose(const std::string& path);
 RecordedPose load_pose_yaml(const std::string& path);
 
 /// easy_handeye2 `.samples` (robot, tracking) or JSON: MoveIt's `pose_samples.json` (effector in the world,
-/// object in the sensor) and others (load_json_pairs). Throws InputError.
+/// object in the sensor) and others (load_json_pairs), or .npz (load_npz_pairs). Throws InputError.
 std::vector<PosePair> load_pose_pairs(const std::string& path);
 
 /// The last whole number in a file name without its folder and ending: "frame_000012.png" is 12.

@@ -45,5 +45,51 @@ TEST_P(MisfitViews, AreThoseThatAreWrong) {
   }
 }
 
+std::string all_of(const std::vector<std::string>& warnings) {
+  std::string said;
+  for (const std::string& warning : warnings) said += warning + '\n';
+  return said;
+}
+
+// Four pictures that belong to the poses of others, of twenty.
+TEST_P(MisfitViews, OfOtherPosesAreNotCalledThoseOfAnArmWhoseModelIsWrong) {
+  SceneSettings settings = protocol_settings(GetParam());
+  settings.views = 20;
+  settings.robot_deg = 0.05;
+  settings.robot_mm = 0.5;
+  HandEyeScene scene = make_scene(settings, board_points(), 7331);
+  const Eigen::Isometry3d first = scene.observations[3].T_base_gripper;
+  for (const auto& [view, next] : {std::pair(3U, 8U), {8U, 12U}, {12U, 17U}})
+    scene.observations[view].T_base_gripper = scene.observations[next].T_base_gripper;
+  scene.observations[17].T_base_gripper = first;
+  const std::string said = all_of(calibrated(scene).warnings);
+  EXPECT_NE(said.find("4 views are off by more than any arm errs: their pictures belong to other poses"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(said.find("model"), std::string::npos) << said;
+}
+
+TEST(MisfitSentence, SplitsWhatIsOffByMoreThanAnyArmErrsFromTheRest) {
+  ViewSelection selection;
+  selection.views.resize(20);
+  for (ViewVerdict& view : selection.views) view.error = {0.001, 0.001};
+  const auto leave_out = [&](std::size_t view, double rotation, double translation) {
+    selection.views[view].used = false;
+    selection.views[view].misfit = true;
+    selection.views[view].error = {rotation, translation};
+  };
+  leave_out(0, 0.001, 0.004);
+  EXPECT_EQ(misfit_sentence(selection), "");  // one slip in twenty
+  leave_out(1, 0.002, 0.004);
+  leave_out(2, 0.002, 0.003);
+  EXPECT_TRUE(misfit_sentence(selection).starts_with("3 views are off by little"))
+      << misfit_sentence(selection);
+  leave_out(3, 0.5, 0.001);
+  leave_out(4, 0.001, 0.2);
+  const std::string both = misfit_sentence(selection);
+  EXPECT_TRUE(both.starts_with("2 views are off by more than any arm errs")) << both;
+  EXPECT_NE(both.find("; 3 views are off by little"), std::string::npos) << both;
+}
+
 }  // namespace
 }  // namespace flash::calib

@@ -1,16 +1,15 @@
 // The ways in which people hand over pictures, poses and intrinsics.
 #include <gtest/gtest.h>
 
-#include <cstdint>
 #include <filesystem>
 
 #include "calib/dataset/dataset.h"
 #include "data/camera/extrinsics.h"
 #include "data/camera/intrinsics_file.h"
 #include "data/files/error.h"
-#include "data/files/npz.h"
 #include "data/motion/trajectory.h"
 #include "data/picture/picture.h"
+#include "tests/data/npz_text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
@@ -331,47 +330,6 @@ TEST(Layouts, NumbersThatAreNoPoseAreNamed) {
   EXPECT_NE(data::input_error_of([&] { load_dataset(folder / ""); }).find("line 1"), std::string::npos);
 }
 
-/// An archive with these arrays of doubles, not compressed.
-std::string npz(const std::vector<std::pair<std::string, std::vector<double>>>& arrays) {
-  std::string file, contents;
-  const auto number = [](std::string& text, auto value) {
-    text.append(reinterpret_cast<const char*>(&value), sizeof value);
-  };
-  for (const auto& [name, values] : arrays) {
-    std::string header =
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (" + std::to_string(values.size()) + ",), }\n";
-    std::string npy = "\x93NUMPY";
-    npy += std::string("\x01\x00", 2);
-    number(npy, static_cast<std::uint16_t>(header.size()));
-    npy += header;
-    for (const double value : values) number(npy, value);
-    const auto place = static_cast<std::uint32_t>(file.size()), size = static_cast<std::uint32_t>(npy.size());
-    const std::string entry = name + ".npy";
-    const auto length = static_cast<std::uint16_t>(entry.size());
-    file += std::string("PK\x03\x04", 4) + std::string(14, '\0');
-    number(file, size);
-    number(file, size);
-    number(file, length);
-    file += std::string(2, '\0') + entry + npy;
-    contents += std::string("PK\x01\x02", 4) + std::string(16, '\0');
-    number(contents, size);
-    number(contents, size);
-    number(contents, length);
-    contents += std::string(12, '\0');
-    number(contents, place);
-    contents += entry;
-  }
-  const auto begin = static_cast<std::uint32_t>(file.size()),
-             size = static_cast<std::uint32_t>(contents.size());
-  const auto count = static_cast<std::uint16_t>(arrays.size());
-  file += contents + std::string("PK\x05\x06", 4) + std::string(4, '\0');
-  number(file, count);
-  number(file, count);
-  number(file, size);
-  number(file, begin);
-  return file + std::string(2, '\0');
-}
-
 TEST(Layouts, IntrinsicsOfManyKinds) {
   const data::TemporaryFolder folder;
   const std::string files[] = {
@@ -398,8 +356,8 @@ TEST(Layouts, IntrinsicsOfManyKinds) {
       folder.write(
           "capitals.json",
           R"({"Intrinsic": [[10,0,4],[0,11,3],[0,0,1]], "Distortion": [-0.1, 0.01, 0.001, 0.002, 0]})"),
-      folder.write("numpy.npz",
-                   npz({{"mtx", {10, 0, 4, 0, 11, 3, 0, 0, 1}}, {"dist", {-0.1, 0.01, 0.001, 0.002, 0}}}))};
+      folder.write("numpy.npz", data::npz_text({{"mtx", {3, 3}, {10, 0, 4, 0, 11, 3, 0, 0, 1}},
+                                                {"dist", {5}, {-0.1, 0.01, 0.001, 0.002, 0}}}))};
   for (const std::string& file : files) {
     const data::CameraIntrinsics camera = data::load_intrinsics(file);
     EXPECT_EQ(camera.width, 0) << file;
@@ -438,7 +396,8 @@ TEST(Layouts, IntrinsicsThatAreNoneAreNamed) {
     });
     EXPECT_NE(said.find("expected plumb_bob, rational_polynomial or none"), std::string::npos) << said;
   }
-  for (const std::string& text : {std::string("no archive"), npz({{"mtx", {10}}}).substr(0, 60)})
+  for (const std::string& text :
+       {std::string("no archive"), data::npz_text({{"mtx", {1}, {10}}}).substr(0, 60)})
     EXPECT_THROW(data::load_intrinsics(folder.write("c.npz", text)), data::InputError);
 }
 

@@ -1,0 +1,108 @@
+#include "data/motion/pose_npz.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "data/files/error.h"
+#include "data/files/npz.h"
+#include "data/motion/pose_numbers.h"
+
+namespace flash::data {
+namespace {
+
+using Arrays = std::map<std::string, NumpyArray>;
+using Names = std::initializer_list<const char*>;
+
+/// As plain() writes them.
+constexpr Names kRobot = {"robot",        "gripper",      "effector",     "hand",
+                          "tbasegripper", "gripper2base", "tgripper2base"};
+constexpr Names kTarget = {"target", "tracking", "object", "board", "marker", "tcameratarget", "target2cam"};
+
+std::string plain(const std::string& name) {
+  std::string text;
+  for (const char c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)))
+      text += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const char* ending : {"poses", "pose"})
+    if (text.ends_with(ending)) text.resize(text.size() - std::string(ending).size());
+  return text;
+}
+
+const NumpyArray* find(const Arrays& arrays, Names names) {
+  for (const char* name : names)
+    if (const auto found = arrays.find(name); found != arrays.end()) return &found->second;
+  return nullptr;
+}
+
+/// "robot 12 x 4 x 4, K 3 x 3"
+std::string described(const std::map<std::string, NumpyArray>& arrays) {
+  std::string text;
+  for (const auto& [name, array] : arrays) {
+    text += (text.empty() ? "" : ", ") + name;
+    for (std::size_t i = 0; i < array.shape.size(); ++i)
+      text += (i > 0 ? " x " : " ") + std::to_string(array.shape[i]);
+  }
+  return text.empty() ? "no arrays" : text;
+}
+
+/// The numbers of each row of a stack, `width` of them; empty where the array is no such stack.
+std::vector<std::vector<double>> rows_of(const NumpyArray& array, std::size_t width) {
+  const std::size_t count = array.shape.empty() ? 0 : array.shape.front();
+  if (count == 0 || array.values.size() != count * width) return {};
+  std::vector<std::vector<double>> rows;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto first = array.values.begin() + static_cast<std::ptrdiff_t>(i * width);
+    rows.emplace_back(first, first + static_cast<std::ptrdiff_t>(width));
+  }
+  return rows;
+}
+
+/// Rows of 3 x 4 from rotations and places.
+std::vector<std::vector<double>> joined(const std::vector<std::vector<double>>& rotations,
+                                        const std::vector<std::vector<double>>& places) {
+  if (rotations.size() != places.size()) return {};
+  std::vector<std::vector<double>> rows;
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    std::vector<double>& row = rows.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto first = rotations[i].begin() + static_cast<std::ptrdiff_t>(3 * k);
+      row.insert(row.end(), first, first + 3);
+      row.push_back(places[i][k]);
+    }
+  }
+  return rows;
+}
+
+/// The poses of one of the two stacks, as numbers; empty where there is none.
+std::vector<std::vector<double>> stack_of(const Arrays& arrays, Names names, const char* rotation,
+                                          const char* place) {
+  if (const NumpyArray* whole = find(arrays, names))
+    for (const std::size_t width : {16, 12, 7})
+      if (std::vector<std::vector<double>> rows = rows_of(*whole, width); !rows.empty()) return rows;
+  const NumpyArray *R = find(arrays, {rotation}), *t = find(arrays, {place});
+  if (R == nullptr || t == nullptr) return {};
+  return joined(rows_of(*R, 9), rows_of(*t, 3));
+}
+
+}  // namespace
+
+std::vector<PosePair> load_npz_pairs(const std::string& path) {
+  const Arrays named = load_npz(path);
+  Arrays arrays;
+  for (const auto& [name, array] : named) arrays.emplace(plain(name), array);
+  const auto robot = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base"),
+             target = stack_of(arrays, kTarget, "rtarget2cam", "ttarget2cam");
+  if (robot.empty() || robot.size() != target.size())
+    throw InputError(
+        path + ": found " + described(named) +
+        ", expected as many poses of the gripper in the base (robot) as of the target in the camera "
+        "(target), each N x 4 x 4, or R_gripper2base, t_gripper2base, R_target2cam, t_target2cam");
+  std::vector<PosePair> pairs;
+  for (std::size_t i = 0; i < robot.size(); ++i) {
+    const std::string where = "pair " + std::to_string(i);
+    pairs.push_back({pose_of_numbers(robot[i], path, where), pose_of_numbers(target[i], path, where)});
+  }
+  return pairs;
+}
+
+}  // namespace flash::data

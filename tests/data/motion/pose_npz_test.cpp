@@ -1,0 +1,77 @@
+#include "data/motion/pose_npz.h"
+
+#include <gtest/gtest.h>
+
+#include "data/files/error.h"
+#include "tests/data/npz_text.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::data {
+namespace {
+
+// Turns by 90 degrees about z and by 180 about x: their matrices are written out by hand.
+constexpr double kFirst[] = {0, -1, 0, 0.1, 1, 0, 0, 0.2, 0, 0, 1, 0.3, 0, 0, 0, 1};
+constexpr double kSecond[] = {1, 0, 0, 0.4, 0, -1, 0, 0.5, 0, 0, -1, 0.6, 0, 0, 0, 1};
+
+/// Row by row, of both poses: those of the 4 x 4 matrix whose place passes.
+template <class Passes>
+std::vector<double> both(const Passes& passes) {
+  std::vector<double> values;
+  for (const double* pose : {kFirst, kSecond})
+    for (int i = 0; i < 16; ++i)
+      if (passes(i / 4, i % 4)) values.push_back(pose[i]);
+  return values;
+}
+
+const std::vector<double> kMatrices = both([](int, int) { return true; });
+
+void expect_both(const std::vector<PosePair>& pairs) {
+  ASSERT_EQ(pairs.size(), 2U);
+  for (const auto member : {&PosePair::T_base_gripper, &PosePair::T_camera_target}) {
+    EXPECT_EQ((pairs[0].*member).matrix()(1, 0), 1);
+    EXPECT_EQ((pairs[0].*member).translation(), Eigen::Vector3d(0.1, 0.2, 0.3));
+    EXPECT_EQ((pairs[1].*member).matrix()(2, 2), -1);
+    EXPECT_EQ((pairs[1].*member).translation(), Eigen::Vector3d(0.4, 0.5, 0.6));
+  }
+}
+
+TEST(PairsOfNumpy, AreReadAsMatrices) {
+  const TemporaryFolder folder;
+  const std::vector<std::string> robots = {"robot", "gripper_poses", "T_base_gripper"},
+                                 targets = {"target", "Board", "T_camera_target"};
+  for (std::size_t i = 0; i < robots.size(); ++i)
+    expect_both(load_pose_pairs(folder.write("pairs.npz", npz_text({{targets[i], {2, 4, 4}, kMatrices},
+                                                                    {"ids", {2}, {7, 8}},
+                                                                    {robots[i], {2, 4, 4}, kMatrices}}))));
+}
+
+TEST(PairsOfNumpy, AreReadAsOpenCvTakesThem) {
+  const TemporaryFolder folder;
+  const std::vector<double> R = both([](int row, int column) { return row < 3 && column < 3; }),
+                            t = both([](int row, int column) { return row < 3 && column == 3; });
+  expect_both(load_pose_pairs(folder.write("pairs.npz", npz_text({{"R_gripper2base", {2, 3, 3}, R},
+                                                                  {"t_gripper2base", {2, 3, 1}, t},
+                                                                  {"R_target2cam", {2, 3, 3}, R},
+                                                                  {"t_target2cam", {2, 3}, t}}))));
+}
+
+TEST(PairsOfNumpy, ThatAreNoneAreToldWhatWasFoundAndExpected) {
+  const TemporaryFolder folder;
+  const auto said = [&](const std::vector<NamedArray>& arrays) {
+    return input_error_of([&] { load_pose_pairs(folder.write("pairs.npz", npz_text(arrays))); });
+  };
+  const std::string unnamed = said({{"arr_0", {2, 4, 4}, kMatrices}, {"arr_1", {2, 4, 4}, kMatrices}});
+  EXPECT_NE(unnamed.find("pairs.npz: found arr_0 2 x 4 x 4, arr_1 2 x 4 x 4, expected as many poses"),
+            std::string::npos)
+      << unnamed;
+  const std::vector<double> one(kMatrices.begin(), kMatrices.begin() + 16);
+  const std::string fewer = said({{"robot", {2, 4, 4}, kMatrices}, {"target", {1, 4, 4}, one}});
+  EXPECT_NE(fewer.find("found robot 2 x 4 x 4, target 1 x 4 x 4"), std::string::npos) << fewer;
+  std::vector<double> skewed = kMatrices;
+  skewed[16] = 0.9;
+  EXPECT_NE(said({{"robot", {2, 4, 4}, skewed}, {"target", {2, 4, 4}, kMatrices}}).find("pair 1"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace flash::data

@@ -1,0 +1,56 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace flash::data {
+
+struct NamedArray {
+  std::string name;
+  std::vector<std::size_t> shape;
+  std::vector<double> values;  ///< row by row
+};
+
+/// An .npz with these arrays of doubles, not compressed.
+inline std::string npz_text(const std::vector<NamedArray>& arrays) {
+  std::string file, contents;
+  const auto number = [](std::string& text, auto value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  for (const auto& [name, shape, values] : arrays) {
+    std::string sizes;
+    for (const std::size_t size : shape) sizes += std::to_string(size) + ",";
+    std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (" + sizes + "), }\n";
+    std::string npy = "\x93NUMPY";
+    npy += std::string("\x01\x00", 2);
+    number(npy, static_cast<std::uint16_t>(header.size()));
+    npy += header;
+    for (const double value : values) number(npy, value);
+    const auto place = static_cast<std::uint32_t>(file.size()), size = static_cast<std::uint32_t>(npy.size());
+    const std::string entry = name + ".npy";
+    const auto length = static_cast<std::uint16_t>(entry.size());
+    file += std::string("PK\x03\x04", 4) + std::string(14, '\0');
+    number(file, size);
+    number(file, size);
+    number(file, length);
+    file += std::string(2, '\0') + entry + npy;
+    contents += std::string("PK\x01\x02", 4) + std::string(16, '\0');
+    number(contents, size);
+    number(contents, size);
+    number(contents, length);
+    contents += std::string(12, '\0');
+    number(contents, place);
+    contents += entry;
+  }
+  const auto begin = static_cast<std::uint32_t>(file.size()),
+             size = static_cast<std::uint32_t>(contents.size());
+  const auto count = static_cast<std::uint16_t>(arrays.size());
+  file += contents + std::string("PK\x05\x06", 4) + std::string(4, '\0');
+  number(file, count);
+  number(file, count);
+  number(file, size);
+  number(file, begin);
+  return file + std::string(2, '\0');
+}
+
+}  // namespace flash::data
