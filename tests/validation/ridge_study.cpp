@@ -18,6 +18,7 @@
 
 #include "data/machine/parallel.h"
 #include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/importance_sampling.h"
 #include "tests/sysid/infer/ridge.h"
 
 namespace flash::sysid {
@@ -60,12 +61,29 @@ Found by_grids(const Ridge& ridge, unsigned seed) {
   return found;
 }
 
+Found by_importance(const Ridge& ridge, unsigned seed) {
+  const Eigen::Index d = ridge.dimensions();
+  const WeightedDraws draws = sample_by_importance(
+      [&](const Eigen::MatrixXd& points) {
+        Eigen::VectorXd logs(points.rows());
+        for (Eigen::Index i = 0; i < points.rows(); ++i)
+          logs[i] = ridge.log_density(points.row(i).transpose());
+        return logs;
+      },
+      Eigen::VectorXd::Zero(d), Eigen::VectorXd::Ones(d), {.seed = seed});
+  Found found{Eigen::MatrixX3d(d, 3), static_cast<int>(draws.points.rows()), draws.effective_size};
+  for (Eigen::Index k = 0; k < d; ++k)
+    for (std::size_t s = 0; s < kShares.size(); ++s)
+      found.quantiles(k, static_cast<Eigen::Index>(s)) = draws.quantile(k, kShares[s]);
+  return found;
+}
+
 struct Way {
   const char* name;
   Found (*find)(const Ridge& ridge, unsigned seed);
 };
 
-constexpr Way kWays[] = {{"grid", by_grids}};
+constexpr Way kWays[] = {{"grid", by_grids}, {"importance", by_importance}};
 
 struct Trial {
   Eigen::VectorXd truth;
