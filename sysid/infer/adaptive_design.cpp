@@ -26,23 +26,6 @@ int points_per_axis(const std::vector<Axis>& axes, Points points) {
               : kDozens)[static_cast<std::size_t>(std::min<std::ptrdiff_t>(searched, 4))];
 }
 
-std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searched, Points of_look) {
-  const int points = points_per_axis(searched, of_look);
-  std::vector<Axis> axes = searched;
-  for (std::size_t k = 0; k < axes.size(); ++k) {
-    Axis& axis = axes[k];
-    if (axis.values.size() < 2) continue;
-    const double first = axis.values.front(), last = axis.values.back();
-    axis.values.clear();
-    for (int i = 0; i < points; ++i) {
-      const double from = coordinate_of(axis, extent[k][0]), to = coordinate_of(axis, extent[k][1]);
-      const double x = from + (to - from) * i / (points - 1);
-      axis.values.push_back(std::clamp(axis.logarithmic ? std::exp(x) : x, first, last));
-    }
-  }
-  return axes;
-}
-
 constexpr double kSame = 1e-9;   // of a width
 constexpr int kRounds = 12;      // of a look
 constexpr int kFewRounds = 4;    // where some dozens of points do
@@ -67,6 +50,23 @@ Extent extent_of(const std::vector<Axis>& axes) {
   Extent extent;
   for (const Axis& axis : axes) extent.push_back({axis.values.front(), axis.values.back()});
   return extent;
+}
+
+std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searched, Points of_look) {
+  const int points = points_per_axis(searched, of_look);
+  std::vector<Axis> axes = searched;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    Axis& axis = axes[k];
+    if (axis.values.size() < 2) continue;
+    const double first = axis.values.front(), last = axis.values.back();
+    axis.values.clear();
+    for (int i = 0; i < points; ++i) {
+      const double from = coordinate_of(axis, extent[k][0]), to = coordinate_of(axis, extent[k][1]);
+      const double x = from + (to - from) * i / (points - 1);
+      axis.values.push_back(std::clamp(axis.logarithmic ? std::exp(x) : x, first, last));
+    }
+  }
+  return axes;
 }
 
 Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& axes) {

@@ -49,6 +49,11 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
 /// At how many a look asks for the likelihood.
 enum class Points { hundreds, dozens };
 
+/// The grid over an extent at which a look asks for the likelihood: 17, 9, 7 or 5 points along each of 1, 2,
+/// 3, or 4 and more searched axes for hundreds, 9, 7, 4 or 3 for dozens. An axis of one value keeps it.
+std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searched,
+                            Points points = Points::hundreds);
+
 /// An extent about the estimate, of which the interval of every parameter takes a half or which ends with the
 /// range of `axes`; `extent`, on which the posterior stands, itself where it is not much too large and cuts
 /// nothing likely off.
