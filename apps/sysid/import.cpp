@@ -103,6 +103,7 @@ int import_markers(const CLI::App& verb, ImportVerbOptions options) {
   settings.name = shared.name;
   settings.out = shared.out;
   settings.overwrite = options.common.force;
+  settings.stop = &stop_on_signals();
   return tell_import(sysid::import_tracks(settings), settings.out, options.common);
 }
 
@@ -119,7 +120,7 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
   if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;
   read_options(options.texts, settings);
-
+  settings.stop = &stop_on_signals();
   return tell_import(sysid::import_recording(settings), settings.out, options.common);
 }
 

@@ -12,6 +12,7 @@
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
 #include "data/files/json_reader.h"
+#include "data/files/staged_folder.h"
 #include "data/files/text.h"
 #include "data/files/writable.h"
 #include "data/mesh/mesh_io.h"
@@ -78,17 +79,10 @@ void remove_former(const std::string& folder) {
   for (const fs::path& path : old) fs::remove(path);
 }
 
-// While the folder is filled a signal leaves what is there.
-void end_half_written(const std::string& folder) {
-  if (stop_on_signals())
-    throw std::runtime_error("stopped before the end; " + folder +
-                             " is not complete: replay again, with --force in the same folder");
-}
-
 void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, const std::string& folder) {
   const Eigen::AlignedBox3d bounds = sysid::bounds_of(overlay, frames);
   for (const int k : frames) {
-    end_half_written(folder);
+    end_after_signal();
     const sysid::OverlayFrame& frame = overlay.frames[static_cast<std::size_t>(k)];
     data::save_png(sysid::draw_overlay({frame.vertices, overlay.triangles}, frame.cloud, bounds),
                    numbered(folder, "%03d.png", k));
@@ -196,16 +190,19 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
       throw data::InputError("--frames: " + std::to_string(k) + " is not a keyframe; expected 0 to " +
                              std::to_string(overlay.frames.size() - 1));
   end_after_signal();
-  remove_former(options.out);
-  sysid::save_overlay(overlay, options.out);
+  data::StagedFolder staged(options.out);
+  sysid::save_overlay(overlay, staged.path());
   if (options.every_step)
     for (std::size_t k = 0; k < motion.motion.positions.size(); ++k) {
-      end_half_written(options.out);
+      end_after_signal();
       data::save_triangle_mesh(
           {motion.motion.positions[k], overlay.triangles},
-          numbered((fs::path(options.out) / "steps").string(), "%06d.ply", static_cast<int>(k)));
+          numbered((fs::path(staged.path()) / "steps").string(), "%06d.ply", static_cast<int>(k)));
     }
-  draw_frames(overlay, frames, options.out);
+  draw_frames(overlay, frames, staged.path());
+  end_after_signal();
+  remove_former(options.out);
+  staged.publish("overlay.csv");
 
   warn_of_camera(recording);
   warn_of_seams(replay.recording);

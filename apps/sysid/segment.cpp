@@ -134,6 +134,7 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
   data::check_folder_free(options.out, options.common.force);
   check_places(views, options.out);
   settings.accept_fault = options.despite_doubts;
+  settings.stop = &stop_on_signals();
   settings.told = [&](const std::string& text) { say(options.common, text); };
   const sysid::SegmentedFolder segmented =
       sysid::segment_folder(views, times_of(options, views), settings, options.out);

@@ -12,7 +12,9 @@
 #include "data/asset/asset_mesh.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
+#include "data/files/folder_lock.h"
 #include "data/files/json_reader.h"
+#include "data/files/staged_folder.h"
 #include "data/files/text.h"
 #include "data/files/writable.h"
 #include "data/mesh/mesh_io.h"
@@ -118,6 +120,30 @@ void check_places(const SynthOptions& options) {
   if (!options.truth.empty()) data::check_file_free(options.truth, options.common.force);
 }
 
+// Of a recording that stands in the folder; what makes it one goes first.
+void remove_former(const std::string& folder) {
+  for (const char* old : {"recording.json", "import.svg", "truth.json", "camera_info.yaml", "frames"})
+    fs::remove_all(fs::path(folder) / old);
+  const auto camera = [&](int c) { return fs::path(folder) / ("camera" + std::to_string(c)); };
+  for (int c = 1; fs::exists(camera(c) / "depth"); ++c) fs::remove_all(camera(c));
+}
+
+// The recording whole or not at all, with its truth where that has no other place.
+void publish_synthetic(const SynthOptions& options, const std::string& truth,
+                       sysid::SynthRecording& synthetic) {
+  data::StagedFolder staged(options.out);
+  if (std::string& mesh = synthetic.recording.mesh_spec;
+      !data::is_mesh_spec(mesh))  // as named from its place
+    mesh = (fs::path(staged.path()) /
+            data::relative_path(mesh, (fs::path(options.out) / "recording.json").string()))
+               .string();
+  sysid::save_synthetic(synthetic, staged.path());
+  if (options.truth.empty()) data::write_atomically((fs::path(staged.path()) / "truth.json").string(), truth);
+  end_after_signal();
+  if (options.common.force) remove_former(options.out);
+  staged.publish("recording.json");
+}
+
 // The recording of a solid again, with the marker tracks that the asset gives it.
 int run_twin(const SynthOptions& options) {
   const data::Recording recording = data::load_recording(options.like);
@@ -149,6 +175,8 @@ int run_twin(const SynthOptions& options) {
   const data::MarkerTracks tracks =
       sysid::simulated_tracks(replay, result.motion, options.marker_noise, options.common.seed);
   end_after_signal();
+  const data::RunFolder run(options.out);
+  fs::remove(fs::path(options.out) / "recording.json");  // what makes a folder a recording goes first
   sysid::save_track_twin(replay.recording, tracks, name_of_folder(options.out), options.out);
   const std::string truth =
       options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
@@ -199,16 +227,10 @@ int run_synth(SynthOptions options) {
   options.solver.stop = &stop_on_signals();
   sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
   end_after_signal();
-  if (options.common.force) {  // what makes a folder a recording goes first
-    for (const char* old : {"recording.json", "import.svg", "truth.json", "camera_info.yaml", "frames"})
-      fs::remove_all(fs::path(options.out) / old);
-    const auto camera = [&](int c) { return fs::path(options.out) / ("camera" + std::to_string(c)); };
-    for (int c = 1; fs::exists(camera(c) / "depth"); ++c) fs::remove_all(camera(c));
-  }
-  sysid::save_synthetic(synthetic, options.out);
   const std::string truth =
       options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
-  data::write_atomically(truth, sysid::truth_text(material, settings));
+  publish_synthetic(options, sysid::truth_text(material, settings), synthetic);
+  if (!options.truth.empty()) data::write_atomically(truth, sysid::truth_text(material, settings));
 
   if (synthetic.unconverged_share > 0)
     warn("the simulation did not converge in " + data::format_short(100 * synthetic.unconverged_share) +

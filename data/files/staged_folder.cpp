@@ -11,6 +11,8 @@
 #include <system_error>
 #include <vector>
 
+#include "data/files/error.h"
+
 namespace flash::data {
 namespace {
 
@@ -18,7 +20,7 @@ namespace fs = std::filesystem;
 
 /// Frames of an earlier, longer recording would follow those of this one.
 void remove_numbered_frames(const fs::path& folder) {
-  static const std::regex name(R"(\d{6}\.(ply|png))");
+  static const std::regex name(R"(\d{3,}\.(ply|png))");
   std::vector<fs::path> old;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.is_regular_file() && std::regex_match(entry.path().filename().string(), name))
@@ -80,7 +82,8 @@ StagedFolder::StagedFolder(const std::string& path) {
   if (!place.has_filename()) place = place.parent_path();  // "lift/"
   const std::string name = '.' + std::to_string(::getpid()) + "-0.tmp";
   final_ = place.string();
-  staged_ = fs::exists(place) ? (place / name).string() : final_ + name;
+  if (fs::exists(place)) run_.emplace(final_);
+  staged_ = run_ ? (place / name).string() : final_ + name;
   for (fs::path parent = place.parent_path(); !fs::exists(parent); parent = parent.parent_path())
     made_ = parent.string();
   remove_abandoned(place.parent_path(), place.filename().string());
@@ -107,7 +110,11 @@ void StagedFolder::remove() {
 
 void StagedFolder::publish(const std::string& last) {
   const fs::path from = staged_, to = final_;
-  if (!fs::exists(to)) return fs::rename(from, to);
+  if (!run_) {
+    if (fs::exists(to))
+      throw InputError(final_ + ": another run has written to it meanwhile; name another folder");
+    return fs::rename(from, to);
+  }
   fs::remove(to / last);
   for (const fs::path& name : names_in(from))
     if (name != last) move_over(from / name, to / name);

@@ -13,6 +13,7 @@
 #include "data/files/error.h"
 #include "data/files/json_reader.h"
 #include "data/files/staged_folder.h"
+#include "data/files/stop.h"
 #include "data/files/text.h"
 #include "data/files/writable.h"
 #include "data/mesh/mesh_io.h"
@@ -140,8 +141,9 @@ void import_frames(const ImportSettings& settings, data::Recording& recording) {
 }
 
 /// Copies all that the recording names below `out`, and names the copies.
-void copy_files(const fs::path& out, data::Recording& recording) {
+void copy_files(const fs::path& out, const std::atomic<bool>* stop, data::Recording& recording) {
   for (std::size_t i = 0; i < recording.keyframes.size(); ++i) {
+    data::end_once(stop);
     data::RecordedKeyframe& keyframe = recording.keyframes[i];
     if (!keyframe.depth.empty())
       keyframe.depth =
@@ -261,7 +263,7 @@ data::Recording import_recording(const ImportSettings& settings) {
   if (const std::string approach = approach_of(trajectory); corner && !approach.empty())
     doubt += "; " + approach;
   data::StagedFolder staged(settings.out);
-  copy_files(staged.path(), recording);
+  copy_files(staged.path(), settings.stop, recording);
   check_as_file(recording, (fs::path(staged.path()) / "recording.json").string(), doubt);
   std::vector<std::string> found = contradictions(recording, keyframes);
   if (const std::string beside = sheet ? beside_the_sheet(recording, keyframes, *sheet) : ""; !beside.empty())
@@ -282,6 +284,7 @@ data::Recording import_recording(const ImportSettings& settings) {
   if (recording.camera) cameras.emplace_back(recording.camera->base_from_camera.translation());
   data::write_atomically((fs::path(staged.path()) / "import.svg").string(),
                          draw_import(recording, keyframes, cameras));
+  data::end_once(settings.stop);
   staged.publish("recording.json");
   data::Recording written = data::load_recording(path);
   written.notices.insert(written.notices.end(), notices.begin(), notices.end());

@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <atomic>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,8 +47,9 @@ struct ImportSettings {
   std::string out;   ///< folder to make
   bool overwrite = false;
   bool accept_unusable = false;  ///< extrinsics that flash-calib ended with exit code 3, and contradictions
-  std::vector<Eigen::Vector3d> cameras;  ///< that made the clouds, base frame [m]; for the picture
-  std::vector<std::string> taken;        ///< what came from elsewhere than its option, for people to read
+  std::vector<Eigen::Vector3d> cameras;     ///< that made the clouds, base frame [m]; for the picture
+  std::vector<std::string> taken;           ///< what came from elsewhere than its option, for people to read
+  const std::atomic<bool>* stop = nullptr;  ///< once set, it ends before its next frame
 };
 
 /// Writes out/recording.json with its frames, trajectory and camera copied beside it, and a picture of what a
@@ -55,7 +57,7 @@ struct ImportSettings {
 /// table, the grasped corner under the gripper, the diagonal along `heading`; notices say what was guessed,
 /// and where first clouds, of a sheet that still lies, fit it better with its sides changed over. Throws
 /// InputError, and leaves nothing behind, where the check fails and where inputs contradict each other
-/// (import_checks.h) and are not accepted so.
+/// (import_checks.h) and are not accepted so; likewise data::Stopped once settings.stop is set.
 data::Recording import_recording(const ImportSettings& settings);
 
 }  // namespace flash::sysid

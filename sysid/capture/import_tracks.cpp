@@ -8,6 +8,7 @@
 #include "data/files/error.h"
 #include "data/files/json_reader.h"
 #include "data/files/staged_folder.h"
+#include "data/files/stop.h"
 #include "data/files/text.h"
 #include "data/files/writable.h"
 #include "data/mesh/procedural_mesh.h"
@@ -112,6 +113,7 @@ data::Recording import_tracks(const TrackImportSettings& settings) {
     json["object"]["asset"] = data::relative_path(settings.asset, (out / "recording.json").string());
     data::write_atomically(staged_json, data::format_json(json));
   }
+  data::end_once(settings.stop);
   staged.publish("recording.json");
   fs::remove(fs::path(settings.out) / "import.svg");  // of what stood there before
   return data::load_recording((out / "recording.json").string());

@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -20,11 +21,12 @@ struct TrackImportSettings {
   std::string name;  ///< empty: the folder's
   std::string out;   ///< folder to make
   bool overwrite = false;
+  const std::atomic<bool>* stop = nullptr;  ///< once set, nothing is written
 };
 
 /// Writes out/recording.json with the tracks, places and a mesh file copied beside it, and loads it back to
 /// check it. Without `placed` the object's frame is that of the markers. Throws InputError, and leaves
-/// nothing behind, where the check fails.
+/// nothing behind, where the check fails; likewise data::Stopped once settings.stop is set.
 data::Recording import_tracks(const TrackImportSettings& settings);
 
 }  // namespace flash::sysid

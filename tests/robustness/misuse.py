@@ -458,7 +458,7 @@ def check_early_signals(options, folder):
             # On a busy machine the signal may come later: what is left then is named.
             lines = re.findall(r"^flash-\w+: (?:warning: )?(?:stopped|the signal came) .*$", error, re.MULTILINE)
             yield len(lines) == 1, f"{where}: says {error}"
-            named = any(word in error for word in ("kept in early", "early is not complete", "it is written"))
+            named = any(word in error for word in ("kept in early", "it is written"))
             yield not (folder / "early").exists() or named, f"{where}: leaves something: {error}"
             shutil.rmtree(folder / "early", ignore_errors=True)
 

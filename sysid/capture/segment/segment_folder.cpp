@@ -15,6 +15,7 @@
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
 #include "data/files/staged_folder.h"
+#include "data/files/stop.h"
 #include "data/files/text.h"
 #include "data/mesh/mesh_io.h"
 #include "data/recording/frame_files.h"
@@ -306,6 +307,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
   std::vector<LabelledFrame> shown;
   std::size_t with_cloth = 0, not_finite = 0;
   for (int k = 0; k < frames; ++k) {
+    data::end_once(settings.stop);
     LabelledFrame frame{merged(views, k, true, not_finite), {}};
     ArmCylinder arm;
     arm.radius = settings.gripper ? settings.arm_radius : 0;
@@ -331,6 +333,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
 
   data::StagedFolder staged(folder);
   for (int k = 0; k < frames; ++k) {
+    data::end_once(settings.stop);
     result.clouds.push_back(frame_name(k));
     data::save_point_cloud(result.frames[k].cloth, (fs::path(staged.path()) / result.clouds.back()).string());
   }
@@ -345,6 +348,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
     data::save_tum(*settings.gripper, cell.trajectory);
   }
   save_segmented_cell(cell, (fs::path(staged.path()) / "segment.json").string());
+  data::end_once(settings.stop);
   staged.publish("segment.json");
   return result;
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <atomic>
 #include <functional>
 #include <optional>
 #include <string>
@@ -61,6 +62,7 @@ struct SegmentFolderSettings {
   int picture_frames = 6;                   ///< shown, evenly spread over the recording
   bool accept_fault = false;                ///< of the cell: say it, and go on
   std::function<void(const std::string&)> told;  ///< progress, for people to read; may be empty
+  const std::atomic<bool>* stop = nullptr;       ///< once set, it ends before its next frame
 };
 
 /// Cuts the cloth out of every frame, all views of one index merged, and writes `folder`/frames/NNNNNN.ply,
@@ -69,7 +71,7 @@ struct SegmentFolderSettings {
 /// frame [s]; they count where there is a gripper, and may be empty without one. The table is sought in what
 /// masks hide as well. Throws InputError, and leaves nothing behind, where views differ in their number of
 /// frames, the gripper's clock is another one, no table is found, cameras, table and gripper are not of one
-/// cell (cell_check.h), or no frame holds any cloth.
+/// cell (cell_check.h), or no frame holds any cloth; likewise data::Stopped once settings.stop is set.
 SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vector<double>& times,
                                const SegmentFolderSettings& settings, const std::string& folder);
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "data/files/atomic_file.h"
+#include "data/files/error.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -85,6 +86,22 @@ TEST(StagedFolder, WhatKilledWritersLeftGoesAndWhatIsHeldStays) {
     EXPECT_NE(::flock(other, LOCK_EX | LOCK_NB), 0);
     ::close(other);
   }
+}
+
+TEST(StagedFolder, OneRunWritesToAFolderAtATime) {
+  const TemporaryFolder folder;
+  folder.write("out/last.json", "old");
+  StagedFolder first(folder / "out");
+  EXPECT_THROW(StagedFolder(folder / "out"), InputError);
+  write_atomically(first.path() + "/last.json", "first");
+  first.publish("last.json");
+  EXPECT_EQ(read_file(folder / "out/last.json"), "first");
+
+  StagedFolder late(folder / "new");  // which another run makes meanwhile
+  write_atomically(late.path() + "/last.json", "late");
+  folder.write("new/last.json", "new");
+  EXPECT_THROW(late.publish("last.json"), InputError);
+  EXPECT_EQ(read_file(folder / "new/last.json"), "new");
 }
 
 }  // namespace
