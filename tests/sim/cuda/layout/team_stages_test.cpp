@@ -54,7 +54,7 @@ TEST(TeamStages, OfOneTurnAreAsLargeAsTheSlowestAsksForAndAllLeaveRoomFor) {
 
 TEST(TeamStages, WithoutRoomThereAreNone) {
   EXPECT_TRUE(team_stages(3, 8, [](int) { return 0; }).empty());
-  const auto stages = team_stages(3, 2, 8, [](int blocks) { return blocks <= 2 ? 1 : 0; });
+  const auto stages = team_stages(3, 8, [](int blocks) { return blocks <= 2 ? 1 : 0; });
   ASSERT_EQ(stages.size(), 2u);
   EXPECT_EQ(stages[0].blocks, 1);
   EXPECT_EQ(stages[0].leave_at, 2);
