@@ -1,7 +1,7 @@
 """Pictures of depth cameras against closed forms and against rays that meet every triangle."""
 import numpy as np
 import pytest
-from conftest import start, write_scene
+from conftest import ROOT, start, write_scene
 
 import flash_sim
 from flash_sim.cameras import NOTHING, PICTURES, quaternions
@@ -272,6 +272,16 @@ def test_arrays_of_the_caller_are_written_to(sim):
     assert drawn["depth"] is given["depth"] and drawn["triangle"] is ids and list(drawn) == ["depth", "triangle"]
     assert np.array_equal(batch[0], clean["depth"]) and (batch[1] == 7).all() and np.array_equal(ids, clean["triangle"])
     assert list(sim.render("eye", "points")) == ["points"]
+
+
+def test_the_listing_of_the_document_makes_a_picture(tmp_path, monkeypatch):
+    listing = (ROOT / "docs/cameras.md").read_text().split("```python")[1].split("```")[0]
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(listing.replace("examples/", f"{ROOT}/examples/"), names)
+    picture = (tmp_path / "fold.pgm").read_bytes()
+    assert picture.startswith(b"P5 320 240 255\n") and len(picture) == 15 + 320 * 240
+    assert names["depth"].min() > 0.3 and len(set(picture[15:])) > 100
 
 
 NAN = float("nan")
