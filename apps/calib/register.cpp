@@ -16,6 +16,7 @@
 #include "apps/command_line/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/calibrate/cell.h"
+#include "calib/calibrate/cell_motion.h"
 #include "calib/detect/lens_doubt.h"
 #include "calib/detect/read_depth.h"
 #include "calib/report/cell_json.h"
@@ -76,14 +77,16 @@ struct Recording {
   calib::Dataset dataset = {};
 };
 
-calib::CellMember member_of(const Recording& recording, const RegisterOptions& options, Doubts& doubts) {
-  const auto& [source, arm, camera, choice, setup, time_offset, dataset] = recording;
+calib::CellRecording solved_recording(const Recording& recording, const RegisterOptions& options) {
+  const calib::Dataset& dataset = recording.dataset;
+  const DatasetChoice& choice = recording.choice;
   const calib::Target target = target_of(choice, dataset);
-  if (setup.empty() && !dataset.setup)
+  if (recording.setup.empty() && !dataset.setup)
     throw data::InputError(choice.path +
                            ": says nothing of the setup; add --setup eye-in-hand or eye-to-hand");
-  const calib::Setup kind =
-      setup.empty() ? *dataset.setup : calib::parse_setup(setup, "command line", "--setup");
+  const calib::Setup setup = recording.setup.empty()
+                                 ? *dataset.setup
+                                 : calib::parse_setup(recording.setup, "command line", "--setup");
   const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
   calib::CalibrateSettings settings;
   settings.target_size_sd = options.target_size_sd;
@@ -92,27 +95,27 @@ calib::CellMember member_of(const Recording& recording, const RegisterOptions& o
   settings.lens = options.lens.knowledge;
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.threads = options.common.threads;
-  settings.refine.bundle.unknowns.time_offsets = time_offset;
-  calib::Calibration calibration;
+  settings.refine.bundle.unknowns.time_offsets = recording.time_offset;
+  calib::CellRecording solved;
+  for (const calib::Frame& frame : dataset.frames) {
+    solved.T_base_gripper.push_back(frame.T_base_gripper);
+    solved.stamps.push_back(frame.stamp);
+  }
+  const auto depth = calib::read_depth(dataset, detections);
+  solved.solve = [=](const std::vector<Eigen::Isometry3d>& poses) {
+    calib::Dataset moved = dataset;
+    for (std::size_t i = 0; i < poses.size(); ++i) moved.frames[i].T_base_gripper = poses[i];
+    return calib::calibrate_images(setup, moved, target, detections, depth, settings).calibration;
+  };
   try {
-    calibration = calib::calibrate_images(kind, dataset, target, detections,
-                                          calib::read_depth(dataset, detections), settings)
-                      .calibration;
+    solved.calibration = solved.solve(solved.T_base_gripper);
   } catch (const data::InputError&) {
     const std::string doubt = calib::lens_doubt(dataset, target, detections);
     if (!doubt.empty()) throw data::InputError(doubt);
     throw;
   }
-  if (!options.common.quiet) {
-    const std::size_t all = calibration.views.size(), used = calibration.used.size();
-    if (used < all)
-      warn_calib(choice.path + ": " + std::to_string(all - used) + " of " + std::to_string(all) +
-                 (all - used == 1 ? " views was not used" : " views were not used") +
-                 "; flash-calib handeye names them");
-  }
-  doubts.add(source, calibration.warnings);
-  for (const std::string& reason : calibration.refusals) doubts.refusals.push_back(source + ": " + reason);
-  return calib::cell_member(arm, camera, dataset, target, calibration);
+  solved.member = calib::cell_member(recording.arm, recording.camera, dataset, target, solved.calibration);
+  return solved;
 }
 
 /// One recording is one witness.
@@ -235,14 +238,24 @@ calib::Cell solved_cell(std::vector<Recording> recordings, const RegisterOptions
   }
   expect_own_files({options.out}, read);
   expect_one_lens(recordings);
+  std::vector<calib::CellRecording> solved;
+  for (const Recording& recording : recordings) solved.push_back(solved_recording(recording, options));
+  const std::vector<std::string> settled = calib::settle_motions(solved);
   std::vector<calib::CellMember> members;
-  for (const Recording& recording : recordings) members.push_back(member_of(recording, options, doubts));
-  return calib::solve_cell(
+  for (std::size_t i = 0; i < solved.size(); ++i) {
+    doubts.add(recordings[i].source, solved[i].calibration.warnings);
+    for (const std::string& reason : solved[i].calibration.refusals)
+      doubts.refusals.push_back(recordings[i].source + ": " + reason);
+    members.push_back(solved[i].member);
+  }
+  calib::Cell cell = calib::solve_cell(
       members,
       {.refine = {},
        .target_size_sd = options.target_size_sd,
        .size_as_stated = options.size_as_stated,
        .lens = options.use == calib::Use::two_arms ? calib::LensKnowledge::stated : options.lens.knowledge});
+  cell.notices.insert(cell.notices.begin(), settled.begin(), settled.end());
+  return cell;
 }
 
 /// Where transforms are composed, each holds with a lens of its own.

@@ -387,7 +387,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.corner_rms = reprojection_rms(bundle, true);
   result.chain_rms = result.comparison.back().px;
   result.centre_rms = centre_rms(answer_of(result), camera, target_poses(observations));
-  add_uncertainty(result, sized.systematic, refine_settings.bundle);
+  const double smooth = add_uncertainty(result, sized.systematic, refine_settings.bundle);
   if (result.method == Method::pixels) {
     result.covariance = pixels->covariance;
     result.repeatable = pixels->repeatable;
@@ -398,7 +398,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.edges = edge_estimate(bundle, result.unknowns, result.shared_covariance);
   if (settings.lens != given.lens)
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
-  check_parts(result, refine_settings.bundle, settings);
+  check_parts(result, smooth, refine_settings.bundle, settings);
   warn_of_lone_view(result, refine_settings.bundle, usual_distance(observations));
   const bool plausible = finish(result, observations);
   // Who keeps a size is answered, however far off it may be.

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "calib/calibrate/cell_check.h"
+#include "calib/calibrate/cell_misfits.h"
 #include "calib/solve/linearization.h"
 #include "calib/uncertainty/view_disagreement.h"
 #include "data/files/error.h"
@@ -51,13 +52,6 @@ CellMember aligned(CellMember member, const Eigen::Isometry3d& target, std::vect
     notices->push_back(member.camera +
                        " numbers the target from its other end than the first camera; turned");
   return member;
-}
-
-/// As two recordings write one pose, to a tenth of a millimetre. Else each counts its pictures by itself.
-bool same_pose(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  constexpr double kSame = 1e-4;  // [m], [rad]
-  const Vector6d apart = motion_between(a, b);
-  return apart.head<3>().norm() < kSame && apart.tail<3>().norm() < kSame;
 }
 
 /// Places of arms and cameras in the world, filled in as members connect them.
@@ -117,6 +111,24 @@ void add_motions(Cell& cell, const std::vector<CellMember>& members, const std::
     cell.cameras[c].covariance += first(&CellMember::camera, cameras[c]).motion_covariance;
 }
 
+/// The views that a calibration left out as they do not fit. Those next to a motion may be of either side of
+/// it, and are none.
+std::vector<std::size_t> misfits_of(const Calibration& calibration) {
+  const std::vector<ViewVerdict>& views = calibration.selection.views;
+  std::vector<bool> misfit;
+  for (const ViewVerdict& view : views) misfit.push_back(view.misfit);
+  for (std::size_t i = 0; calibration.other_part && i < views.size(); ++i) {
+    if (calibration.selection.observations[i].image != calibration.other_part->view) continue;
+    const bool before = calibration.other_part->before;
+    for (std::size_t k = before ? i : i - 1; k < views.size() && misfit[k]; k += before ? 1 : -1)
+      misfit[k] = false;
+  }
+  std::vector<std::size_t> list;
+  for (std::size_t i = 0; i < misfit.size(); ++i)
+    if (misfit[i]) list.push_back(i);
+  return list;
+}
+
 }  // namespace
 
 CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
@@ -138,6 +150,9 @@ CellMember cell_member(const std::string& arm, const std::string& camera, const 
     member.observations.push_back(calibration.selection.observations[view]);
     member.stamps.push_back(dataset.frames[view].stamp);
   }
+  for (const std::size_t view : misfits_of(calibration))
+    member.misfits.push_back({calibration.selection.observations[view].image, dataset.frames[view].stamp,
+                              calibration.selection.observations[view].T_base_gripper});
   return member;
 }
 
@@ -211,8 +226,9 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   return bundle;
 }
 
-Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& given) {
-  Cell cell{.joint = true};
+Cell solve_cell(const std::vector<CellMember>& all, const CellSettings& given) {
+  Cell cell{.joint = true, .notices = misfit_sentences(all)};
+  const std::vector<CellMember> members = without_wrong_poses(all);
   const bool as_stated = given.target_size_sd == 0.0 || given.size_as_stated;
   const bool unknown_sizes = given.target_size_sd && std::isinf(*given.target_size_sd);
   RefineSettings settings = given.refine;

@@ -13,6 +13,13 @@
 
 namespace flash::calib {
 
+/// A view that a calibration left out as it does not fit the others.
+struct MisfitView {
+  std::string image;
+  double stamp = 0;
+  Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();  ///< as reported
+};
+
 /// What one camera saw of one arm. All members of a cell are eye-to-hand, or all eye-in-hand.
 struct CellMember {
   std::string arm, camera;  ///< names; members that share one share its unknowns
@@ -23,7 +30,8 @@ struct CellMember {
   std::vector<Symmetry> symmetries = {};
   std::vector<Observation> observations = {};  ///< in use, T_camera_target the chosen pose alone
   std::vector<double> stamps = {};             ///< equal stamps and poses of one arm are one pose of it
-  HandEyePoses poses = {};                     ///< of the calibration by itself
+  std::vector<MisfitView> misfits = {};
+  HandEyePoses poses = {};  ///< of the calibration by itself
   Matrix6d covariance = Matrix6d::Zero();
   Matrix6d motion_covariance = Matrix6d::Zero();  ///< as Calibration has it
   double corner_px = 0;                           ///< noise of its corners, by itself; 0: not known
@@ -67,7 +75,8 @@ struct CellSettings {
   LensKnowledge lens = LensKnowledge::near;
 };
 
-/// Solved by errors in variables, with lenses, sizes, warps and edges of targets among the unknowns.
+/// Solved by errors in variables, with lenses, sizes, warps and edges of targets among the unknowns. Views
+/// that members left out are named by whose fault they are (misfit_sentences).
 Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& settings = {});
 
 /// Covariance of where a point lies, p in the frame's child, seen from its parent [m^2].

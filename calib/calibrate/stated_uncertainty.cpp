@@ -1,6 +1,7 @@
 #include "calib/calibrate/stated_uncertainty.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -17,20 +18,16 @@ double growth(const Matrix6d& less, const Matrix6d& more) {
   return std::max(1.0, less.ldlt().solve(more).trace() / 6);
 }
 
-}  // namespace
+/// Adds what `least` has beyond `covariance`, direction by direction.
+void raise_to(const Matrix6d& least, Matrix6d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> missing(least - covariance);
+  covariance += missing.eigenvectors() * missing.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                missing.eigenvectors().transpose();
+}
 
-void add_uncertainty(Calibration& result, const SystematicUncertainty& systematic,
-                     const BundleSettings& settings) {
-  const SharedColumns columns = shared_columns(result.refined.bundle, settings.unknowns);
-  const double lens = lens_disagreement(result.refined, settings);
-  result.lens_view_factor = lens;
-  result.shared_covariance = with_lens_raised(systematic.covariance, columns, lens);
-  result.covariance = result.shared_covariance.topLeftCorner<6, 6>();
-  result.repeatable = with_lens_raised(result.refined.covariance, columns, lens).topLeftCorner<6, 6>();
-  const CorrelatedPoseErrors& errors = result.pose_errors.emplace(systematic.arms.front());
+void tell_smooth_errors(Calibration& result, double grown) {
   constexpr double kTold = 1.5;  // of the deviations
-  const double grown = growth(result.repeatable, result.covariance);
-  if (!errors.found || grown < kTold * kTold) return;
+  if (!result.pose_errors->found || grown < kTold * kTold) return;
   char text[320];
   std::snprintf(
       text, sizeof text,
@@ -41,30 +38,59 @@ void add_uncertainty(Calibration& result, const SystematicUncertainty& systemati
   result.warnings.emplace_back(text);
 }
 
-void check_parts(Calibration& result, const BundleSettings& settings, const CalibrateSettings& calibrate) {
-  if (result.used.size() < 4 * static_cast<std::size_t>(calibrate.least_views)) return;
-  const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings, 0, calibrate.threads);
+/// The parts of a recording: by how much they disagree beyond noise, factors of variances.
+struct Parts {
+  double views = 1, halves = 1;
+  const SplitCheck* worst = nullptr;  ///< of the halves, where they disagree
+};
+
+Parts parts_of(Calibration& result, const BundleSettings& settings, const CalibrateSettings& calibrate) {
+  if (result.used.size() < 4 * static_cast<std::size_t>(calibrate.least_views)) return {};
   result.splits = {check_halves(result.refined, settings, Split::interleaved)};
+  const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings, 0, calibrate.threads);
   result.splits.insert(result.splits.end(), systematic.begin(), systematic.end());
-  const SplitCheck* worst = nullptr;
-  const double of_halves = split_inflation(systematic, &worst),
-               of_views = camera_disagreement(result.refined, settings);
+  Parts parts{.views = camera_disagreement(result.refined, settings)};
+  parts.halves = split_inflation(systematic, &parts.worst);
+  if (parts.worst != nullptr)
+    parts.worst = &result.splits[1 + static_cast<std::size_t>(parts.worst - systematic.data())];
+  return parts;
+}
+
+}  // namespace
+
+double add_uncertainty(Calibration& result, const SystematicUncertainty& systematic,
+                       const BundleSettings& settings) {
+  const SharedColumns columns = shared_columns(result.refined.bundle, settings.unknowns);
+  result.lens_view_factor = lens_disagreement(result.refined, settings);
+  result.shared_covariance = with_lens_raised(systematic.covariance, columns, result.lens_view_factor);
+  result.covariance = result.shared_covariance.topLeftCorner<6, 6>();
+  result.repeatable =
+      with_lens_raised(result.refined.covariance, columns, result.lens_view_factor).topLeftCorner<6, 6>();
+  result.pose_errors = systematic.arms.front();
+  return growth(result.repeatable, result.covariance);
+}
+
+void check_parts(Calibration& result, double smooth, const BundleSettings& settings,
+                 const CalibrateSettings& calibrate) {
+  const Parts parts = parts_of(result, settings, calibrate);
   const Matrix6d noise = result.refined.covariance.topLeftCorner<6, 6>();
   const auto missing = [&](const Matrix6d& stated, double factor) {
     return std::max(1.0, factor / growth(noise, stated));
   };
-  result.repeatable *= missing(result.repeatable, std::max(of_halves, of_views));
-  result.covariance *= missing(result.covariance, of_views);
-  result.covariance_factor = missing(result.covariance, of_halves);
-  if (worst == nullptr || result.covariance_factor == 1) return;
+  const double scatter = missing(result.repeatable, std::max(parts.halves, parts.views));
+  result.repeatable *= scatter;
+  tell_smooth_errors(result, smooth / scatter);
+  result.covariance_factor = missing(result.covariance, parts.halves);
   result.covariance *= result.covariance_factor;
+  raise_to(result.repeatable, result.covariance);
+  if (parts.worst == nullptr || result.covariance_factor == 1) return;
   char text[240];
   std::snprintf(
       text, sizeof text,
       "%s differ by %.1f mm and %.2f deg, more than noise explains: drift, or errors that depend on "
       "the pose; the stated standard deviations were raised by %.1f",
-      describe(worst->split).c_str(), 1e3 * worst->apart.head<3>().norm(),
-      worst->apart.tail<3>().norm() / kDegree, std::sqrt(result.covariance_factor));
+      describe(parts.worst->split).c_str(), 1e3 * parts.worst->apart.head<3>().norm(),
+      parts.worst->apart.tail<3>().norm() / kDegree, std::sqrt(result.covariance_factor));
   result.warnings.emplace_back(text);
 }
 

@@ -4,13 +4,15 @@
 namespace flash::calib {
 
 /// The covariances that a solution states, `repeatable` of what scatters and `covariance` of all: noise, what
-/// views disagree on about the lens, and what errors that change smoothly with the robot's pose share, which
-/// is told where it raises the deviations by half.
-void add_uncertainty(Calibration& result, const SystematicUncertainty& systematic,
-                     const BundleSettings& settings);
+/// views disagree on about the lens, and what errors that change smoothly with the robot's pose share.
+/// Returns by how much these have raised the variances.
+double add_uncertainty(Calibration& result, const SystematicUncertainty& systematic,
+                       const BundleSettings& settings);
 
 /// Raises both by as much as parts of the recording disagree beyond that: its views one by one, and halves of
-/// them, which are told. Parts of few views determine too little by themselves.
-void check_parts(Calibration& result, const BundleSettings& settings, const CalibrateSettings& calibrate);
+/// them, which are told. Parts of few views determine too little by themselves. smooth: what add_uncertainty
+/// returned; it is told where it raises the deviations by half beyond what parts show.
+void check_parts(Calibration& result, double smooth, const BundleSettings& settings,
+                 const CalibrateSettings& calibrate);
 
 }  // namespace flash::calib
