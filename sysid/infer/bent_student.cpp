@@ -41,6 +41,22 @@ class Moments {
   Eigen::MatrixXd third_, fourth_;  ///< d x d^2 and d^2 x d^2
 };
 
+/// Directions that parabolas are looked for along, a row each: the coordinates, the white ones, and sums and
+/// differences of two of these.
+Eigen::MatrixXd directions_of(const Eigen::MatrixXd& root) {
+  const Eigen::Index d = root.rows();
+  Eigen::MatrixXd directions(d * (d + 1), d);
+  directions << root, Eigen::MatrixXd::Identity(d, d), Eigen::MatrixXd::Zero(d * (d - 1), d);
+  Eigen::Index row = 2 * d;
+  for (Eigen::Index i = 0; i < d; ++i)
+    for (Eigen::Index j = 0; j < i; ++j)
+      for (const double sign : {-1.0, 1.0}) {
+        directions(row, i) = 1;
+        directions(row++, j) = sign;
+      }
+  return directions;
+}
+
 /// The parabola that explains most, by pattern search from the best of the rows of `starts`.
 Parabola best_parabola(const Moments& moments, const Eigen::MatrixXd& starts) {
   constexpr double kFirst = 0.4, kLast = 0.01;  // steps of a unit vector
@@ -122,9 +138,7 @@ BentStudent fitted_student(const Eigen::MatrixXd& points, const Eigen::VectorXd&
   fitted.root = scale.llt().matrixL();
   const Eigen::MatrixXd white =
       fitted.root.triangularView<Eigen::Lower>().solve(from.transpose()).transpose();
-  Eigen::MatrixXd starts(2 * d, d);  // the coordinates, and the white ones
-  starts << fitted.root, Eigen::MatrixXd::Identity(d, d);
-  Parabola parabola = best_parabola(Moments(white, weights), starts);
+  Parabola parabola = best_parabola(Moments(white, weights), directions_of(fitted.root));
   if (!(parabola.explained * count > kChance * static_cast<double>(d))) return fitted;
   parabola.bend *= count / (count + kStraight);
   bend(fitted, parabola, white, weights, share);

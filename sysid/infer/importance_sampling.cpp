@@ -65,7 +65,8 @@ class Sample {
   /// Of each point for a power of the density. Some log is finite.
   Eigen::VectorXd weights(double power) const {
     const Eigen::ArrayXd logs = power * logs_.array() - drawn_.log();
-    const Eigen::ArrayXd shares = (logs - logs.maxCoeff()).exp();
+    // Eigen's vectorized exp(-infinity) is not 0.
+    const Eigen::ArrayXd shares = logs.isFinite().select((logs - logs.maxCoeff()).exp(), 0);
     return shares / shares.sum();
   }
 
@@ -78,7 +79,7 @@ class Sample {
       const double middle = (low + high) / 2;
       (effective_size_of(weights(middle)) >= least ? low : high) = middle;
     }
-    return weights(low);
+    return weights(high);  // above 0, which would give points of density 0 a weight
   }
 
   void add(const Mixture& mixture, const Eigen::MatrixXd& points, const Eigen::VectorXd& logs) {

@@ -1,8 +1,8 @@
 // Whether posteriors on ridges are right, straight and bent ones, against exact answers: quantiles, how often
 // intervals hold the truth, and at how many points the likelihood is asked for.
 //   ridge_study [WAY [DRAWS [FIRST_SEED [DIMENSIONS]]]]
-// WAY is `grid` (refined grids with splines) or empty: all. A row is of DRAWS truths and data, by default
-// 200, of DIMENSIONS parameters, by default of 2 to 6.
+// WAY is `grid` (refined grids with splines), `importance` (importance sampling) or empty: all. A row is of
+// DRAWS truths and data, by default 200, of DIMENSIONS parameters, by default of 2 to 6.
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -84,6 +84,9 @@ struct Way {
 };
 
 constexpr Way kWays[] = {{"grid", by_grids}, {"importance", by_importance}};
+
+/// Bends and stretches.
+constexpr std::array<std::array<double, 2>, 3> kShapes = {{{0, 0}, {0.5, 0}, {0, 0.4}}};
 
 struct Trial {
   Eigen::VectorXd truth;
@@ -171,6 +174,10 @@ void print_head() {
   std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
 }
 
+const char* shape_of(const Ridge& ridge) {
+  return ridge.bend > 0 ? "bent" : ridge.stretch > 0 ? "stretched" : "straight";
+}
+
 void study(const Way& way, const Ridge& ridge, int draws, unsigned first_seed) {
   const auto start = std::chrono::steady_clock::now();
   const std::vector<Trial> trials = tried(way, ridge, draws, first_seed);
@@ -180,10 +187,9 @@ void study(const Way& way, const Ridge& ridge, int draws, unsigned first_seed) {
   for (const Trial& trial : trials) likelihoods += trial.found.likelihoods;
   const Errors errors = errors_of(trials, ridge);
   std::printf("| %s | %s | %.2f | %d | %d | %.3f | %.3f | %.3f | %.2f | %.1f %% | %.0f | %s | %.3f |\n",
-              way.name, ridge.bend > 0 ? "bent" : "straight", ridge.correlation,
-              static_cast<int>(ridge.dimensions()), draws, errors.mean[0], errors.mean[1], errors.mean[2],
-              errors.largest.maxCoeff(), 100 * share_inside(trials), likelihoods / draws,
-              effective_sizes(trials).c_str(), seconds);
+              way.name, shape_of(ridge), ridge.correlation, static_cast<int>(ridge.dimensions()), draws,
+              errors.mean[0], errors.mean[1], errors.mean[2], errors.largest.maxCoeff(),
+              100 * share_inside(trials), likelihoods / draws, effective_sizes(trials).c_str(), seconds);
   std::fflush(stdout);
 }
 
@@ -199,9 +205,10 @@ int main(int argc, char** argv) {
   for (const flash::sysid::Way& way : flash::sysid::kWays) {
     if (!only.empty() && only != way.name) continue;
     for (int d = 2; d <= 6; ++d)
-      for (const double bend : {0.0, 0.5})
+      for (const auto& [bend, stretch] : flash::sysid::kShapes)
         for (const double correlation : {0.9, 0.95, 0.99})
           if (dimensions == 0 || dimensions == d)
-            flash::sysid::study(way, {Eigen::VectorXd::Zero(d), 0.03, correlation, bend}, draws, first_seed);
+            flash::sysid::study(way, {Eigen::VectorXd::Zero(d), 0.03, correlation, bend, stretch}, draws,
+                                first_seed);
   }
 }
