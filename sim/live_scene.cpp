@@ -211,7 +211,8 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, co
   s.time_step = scene.time_step;
   s.quasistatic = scene.rest_motion.has_value();
   s.notices = scene.notices;
-  const std::vector<SceneBody> bodies = scene_bodies(scene, scene.steps, s.notices);
+  // There is no last step: what moves by the file does so to the end of its trajectory.
+  const std::vector<SceneBody> bodies = scene_bodies(scene, data::max_steps, s.notices);
   s.worlds = scene_worlds(scene, bodies, environments, {}, threads, device, &s.stop);
   for (std::size_t w = 0; w < bodies.size(); ++w) {
     s.starts.push_back(bodies[w].environment.state);

@@ -211,9 +211,11 @@ def test_pictures_are_of_the_present(sim):
 
 
 def test_an_obstacle_of_the_file_moves_with_its_trajectory(tmp_path):
+    """To its end, however many steps the file asks for."""
     path = [{"t": 0, "translation": [0.1, 0.1, 0.1], "rotation_xyzw": [0, 0, 0, 1]},
             {"t": 0.1, "translation": [0.1, 0.1, 0.2], "rotation_xyzw": [0, 0, 0, 1]}]
-    sim = start(write_scene(tmp_path, obstacles={"lift": {"shape": "box", "size": [0.04, 0.04, 0.02], "keyframes": path}}), 2)
+    sim = start(write_scene(tmp_path, obstacles={"lift": {"shape": "box", "size": [0.04, 0.04, 0.02], "keyframes": path}}, steps=3),
+                2)
     add(sim)
     add(sim, "riding", [0, 0, 0.3, 1, 0, 0, 0], carrier="lift")
     for steps, z in ((0, 0.1), (4, 0.14), (6, 0.2)):
