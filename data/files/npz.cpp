@@ -102,9 +102,7 @@ std::map<std::string, NumpyArray> load_npz(const std::string& path) {
     at<char>(file, entry + 46 + name_length, path);
     std::string name = file.substr(entry + 46, name_length);
     if (name.ends_with(".npy")) name.resize(name.size() - 4);
-    if (method != 0)
-      throw InputError(path + ": " + name +
-                       " is compressed; write it with numpy.savez");
+    if (method != 0) throw InputError(path + ": " + name + " is compressed; write it with numpy.savez");
     const std::size_t begin =
         local + 30 + at<std::uint16_t>(file, local + 26, path) + at<std::uint16_t>(file, local + 28, path);
     if (begin + size > file.size()) throw InputError(path + ": " + name + ": ends within its data");
