@@ -33,6 +33,7 @@ struct GridOptions {
   bool no_solver_check = false;
   bool no_horizon = false;
   bool no_plan = false;
+  bool sampled = false;
   bool resume = false;
   std::string rollouts;
   std::vector<std::string> map;
@@ -153,6 +154,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
   asked.horizon = !options.no_horizon;
   asked.solver_check = !options.no_solver_check;
+  asked.sampled = options.sampled;
   Search search{asset, std::move(replays), settings, asked, options.map, options.out, begin};
   search.plan = !options.no_plan;
   return run_search(search, store, options.common);
@@ -181,6 +183,8 @@ void add_grid_verb(CLI::App& app, Action& action) {
                  "Do not solve the estimate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_flag("--no-plan", options->no_plan, "Do not say what to record next, which takes simulations");
+  verb->add_flag("--sampled", options->sampled, "Posteriors by importance sampling in place of grids")
+      ->group("");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions, for several searches; without it, motions/ of the run");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");

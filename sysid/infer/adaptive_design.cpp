@@ -267,6 +267,32 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
   return deviance;
 }
 
+Eigen::VectorXd deviance_at(const Emulator& emulator, const std::vector<std::vector<double>>& points,
+                            const MotionLikelihood& likelihood, const GridSettings& grid,
+                            const TellWork& told) {
+  constexpr std::size_t kTogether = 8;  // points that a thread takes, in the same memory
+  using Slices = std::vector<TwoMeshSlice>;
+  Slices all(emulator.models.size());
+  for (std::size_t r = 0; r < all.size(); ++r) all[r].take(emulator.models[r].model);
+  Eigen::VectorXd deviance(static_cast<Eigen::Index>(points.size()));
+  const std::atomic<bool>* const stop = emulator.models.front().replay.settings.solver.stop;
+  const std::size_t parts = (points.size() + kTogether - 1) / kTogether;
+  data::for_each_in_parallel(parts, grid.threads, [&](std::size_t part) {
+    std::vector<Slices> held(points.front().size());  // one an axis
+    ReadMotions motions(emulator);
+    for (std::size_t i = part * kTogether; i < std::min((part + 1) * kTogether, points.size()); ++i) {
+      if (stop != nullptr && *stop) throw data::Stopped();
+      for (std::size_t k = 0; k < held.size(); ++k) hold(k == 0 ? all : held[k - 1], points[i][k], held[k]);
+      motions.take(held.back());
+      const double here = likelihood.deviance(
+          [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); });
+      deviance[static_cast<Eigen::Index>(i)] = std::isnan(here) ? INFINITY : here;
+      if (told) told({0, 1}, {});
+    }
+  });
+  return deviance;
+}
+
 std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<double>& values,
                                    const Extent& extent, const std::vector<Axis>& axes) {
   constexpr double kStep = 0.1;  // of the extent, to both sides

@@ -23,6 +23,7 @@ Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& a
 struct Look {
   MotionLikelihood likelihood;
   Posterior posterior;
+  std::optional<double> effective_size = {};  ///< of a sampled one (sampled_look)
 };
 
 /// What stands in for the simulations of a search.
@@ -45,6 +46,11 @@ std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<d
 Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>& axes,
                               const MotionLikelihood& likelihood, const GridSettings& grid,
                               const TellWork& told = {});
+
+/// The likelihood of modelled motions at points, one value an axis, in order.
+Eigen::VectorXd deviance_at(const Emulator& emulator, const std::vector<std::vector<double>>& points,
+                            const MotionLikelihood& likelihood, const GridSettings& grid,
+                            const TellWork& told = {});
 
 /// At how many a look asks for the likelihood.
 enum class Points { hundreds, dozens };

@@ -8,6 +8,7 @@
 #include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
+#include "sysid/infer/importance_sampling.h"
 #include "sysid/infer/lattice_about.h"
 #include "sysid/infer/nearby.h"
 #include "sysid/infer/recentre.h"
@@ -360,6 +361,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         " on the same mesh: errors of the cells, of the step and of what is held decide "
         "between them; search on a finer mesh, with a shorter step, or what is held too");
   warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
+  if (const double size = there.look.effective_size.value_or(INFINITY); size < ImportanceSettings{}.enough)
+    answer.warnings.push_back("the posterior stands on " + std::to_string(std::lround(size)) +
+                              " effective draws, expected " +
+                              std::to_string(std::lround(ImportanceSettings{}.enough)) +
+                              ": intervals are rough; search fewer parameters or a smaller range");
 
   Posterior posterior = there.look.posterior;
   if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);

@@ -19,6 +19,7 @@ struct AnswerSettings {
   std::optional<double> repeatability;  ///< trial-to-trial distance of a keyframe [m]
   bool horizon = true;                  ///< drop keyframes beyond the predictable
   bool solver_check = true;             ///< solve the estimate again under finer settings
+  bool sampled = false;                 ///< posteriors by importance sampling (sampled_look), not on grids
   std::vector<Axis> ranges = {};        ///< searched before the grid at hand; empty: its own
 };
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "data/machine/parallel.h"
+#include "sysid/infer/sampled_look.h"
 #include "sysid/infer/solution_errors.h"
 #include "sysid/observe/motion_distance.h"
 
@@ -54,6 +55,9 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
                                const Extent& extent, const std::vector<double>& at,
                                std::vector<KnownError> errors, std::vector<KnownError>& held) {
   const auto look = [&](const Extent& start, const std::vector<double>& values) {
+    if (task.settings.sampled)
+      return sampled_look(emulator, start, values, axes, task.grid, task.settings.repeatability, errors,
+                          task.told);
     return narrow(emulator, start, values, axes, task.grid, task.settings.repeatability, errors, task.told);
   };
   const Look first = look(extent, at);

@@ -1,8 +1,9 @@
 // Whether posteriors on ridges are right, straight and bent ones, against exact answers: quantiles, how often
 // intervals hold the truth, and at how many points the likelihood is asked for.
 //   ridge_study [WAY [DRAWS [FIRST_SEED [DIMENSIONS]]]]
-// WAY is `grid` (refined grids with splines), `importance` (importance sampling) or empty: all. A row is of
-// DRAWS truths and data, by default 200, of DIMENSIONS parameters, by default of 2 to 6.
+// WAY is `exact` (the formula), `grid` (refined grids with splines), `importance` (importance sampling) or
+// empty: all. A row is of DRAWS truths and data, by default 200, of DIMENSIONS parameters, by default of 2 to
+// 6.
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -78,12 +79,21 @@ Found by_importance(const Ridge& ridge, unsigned seed) {
   return found;
 }
 
+/// How often exact intervals hold these truths, by chance.
+Found by_formula(const Ridge& ridge, unsigned) {
+  Found found{Eigen::MatrixX3d(ridge.dimensions(), 3)};
+  for (Eigen::Index k = 0; k < ridge.dimensions(); ++k)
+    for (std::size_t s = 0; s < kShares.size(); ++s)
+      found.quantiles(k, static_cast<Eigen::Index>(s)) = ridge.quantile(k, kShares[s]);
+  return found;
+}
+
 struct Way {
   const char* name;
   Found (*find)(const Ridge& ridge, unsigned seed);
 };
 
-constexpr Way kWays[] = {{"grid", by_grids}, {"importance", by_importance}};
+constexpr Way kWays[] = {{"exact", by_formula}, {"grid", by_grids}, {"importance", by_importance}};
 
 /// Bends and stretches.
 constexpr std::array<std::array<double, 2>, 3> kShapes = {{{0, 0}, {0.5, 0}, {0, 0.4}}};
