@@ -341,9 +341,9 @@ TEST_F(RecordingFiles, MillimetresAreRecognised) {
 
 TEST_F(RecordingFiles, BrokenAndEmptyCloudsAreNamed) {
   json_["keyframes"][0]["cloud"] = "frames/001.ply";
-  EXPECT_EQ(
-      message(),
-      "keyframes: no keyframe has a point inside the crop box, y below 1 m, z above 0.02 m, expected points in metres in the base frame");
+  EXPECT_EQ(message(),
+            "keyframes: no keyframe has a point inside the crop box, y below 1 m, z above 0.02 m, expected "
+            "points in metres in the base frame");
   Points cloud = load_point_cloud(folder_ / "frames/000.ply");
   cloud(1, 2) = NAN;
   save_point_cloud(cloud, folder_ / "frames/001.ply");
