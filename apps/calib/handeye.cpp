@@ -240,7 +240,7 @@ void expect_frame_names(const std::string& parent, const std::string& child) {
                            '"');
 }
 
-int run_handeye(HandEyeOptions options) {
+int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   expect_no_camera(options.lens, options.dataset.camera);
   if (!options.lens.own.empty()) options.dataset.camera = options.lens.own;
   const std::string report = report_path(options);
@@ -252,6 +252,7 @@ int run_handeye(HandEyeOptions options) {
   expect_frame_names(options.parent, options.child);
   Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
+  expect_no_picture_options(verb, dataset);
   expect_own_files(outputs, files_read(options.dataset, dataset, options.common));
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
@@ -345,7 +346,8 @@ void add_handeye_verb(CLI::App& app, Action& action) {
       "Examples:\n"
       "  flash-calib handeye wrist --setup eye-in-hand --target chessboard:9x6:0.025 -o camera.json\n"
       "  flash-calib handeye left --setup eye-to-hand --target aruco:DICT_4X4_50:0:0.09 -o left.json");
-  verb->callback([options, &action] { action = [options] { return run_handeye(*options); }; });
+  verb->callback(
+      [verb, options, &action] { action = [verb, options] { return run_handeye(*verb, *options); }; });
 }
 
 }  // namespace flash

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -6,6 +7,7 @@
 #include "apps/calib/options.h"
 #include "apps/calib/verbs.h"
 #include "apps/command_line/command_line.h"
+#include "apps/command_line/option_checks.h"
 #include "apps/command_line/result_files.h"
 #include "calib/dataset/lens_file.h"
 #include "calib/dataset/told_shape.h"
@@ -79,6 +81,7 @@ int run_intrinsics(const IntrinsicsOptions& options) {
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   calib::Dataset dataset = load_dataset(options.dataset, false, false);
   expect_own_files({options.out}, files_read(options.dataset, dataset, options.common));
+  expect_ending("--out", options.out, {".yaml", ".yml"});
   const calib::Target target = target_of(options.dataset, dataset);
   dataset.camera.reset();
   calib::IntrinsicsSettings settings;
@@ -102,7 +105,12 @@ int run_intrinsics(const IntrinsicsOptions& options) {
     std::cout << data::format_json(result_json(estimate)) << '\n';
   else
     print_table(estimate);
-  return exit_done;
+  if (estimate.usable()) return exit_done;
+  say_unusable("the focal length is known to " +
+               data::format_short(
+                   100 * std::max(estimate.sd[0] / estimate.camera.fx, estimate.sd[1] / estimate.camera.fy)) +
+               " %, expected " + data::format_short(100 * calib::most_focal_sd) + " % or better");
+  return exit_unusable;
 }
 
 }  // namespace
@@ -118,6 +126,7 @@ void add_intrinsics_verb(CLI::App& app, Action& action) {
   verb->add_option("-o,--out", options->out, "camera_info YAML to write");
   add_calib_common_options(*verb, options->common);
   verb->footer(
+      "Exit code 3: the focal length is known to no better than 5 %; the file is written.\n"
       "Example:\n  flash-calib intrinsics recording --target chessboard:9x6:0.025 -o camera_info.yaml");
   verb->callback([options, &action] { action = [options] { return run_intrinsics(*options); }; });
 }

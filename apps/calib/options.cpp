@@ -122,12 +122,42 @@ std::string options_file(const CalibCommonOptions& options) {
   return given ? options.config->results().front() : "";
 }
 
+namespace {
+
+/// Poses of a dataset, which a verb that needs none does not read: no result takes their place either.
+std::vector<std::string> poses_beside(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (!entry.path().filename().string().starts_with("pose")) continue;
+    if (entry.is_regular_file(error)) files.push_back(entry.path().string());
+    for (const auto& pose : std::filesystem::directory_iterator(entry.path(), error))
+      files.push_back(pose.path().string());
+  }
+  return files;
+}
+
+}  // namespace
+
 std::vector<std::string> files_read(const DatasetChoice& choice, const calib::Dataset& dataset,
                                     const CalibCommonOptions& options) {
   std::vector<std::string> files = dataset.files;
+  const std::vector<std::string> others = poses_beside(dataset.source);
+  files.insert(files.end(), others.begin(), others.end());
   for (const std::string& path : {choice.target, options_file(options)})
     if (!path.empty()) files.push_back(path);
   return files;
+}
+
+void expect_no_picture_options(const CLI::App& verb, const calib::Dataset& dataset) {
+  if (!dataset.frames.front().T_camera_target) return;
+  for (const char* name :
+       {"--target", "--poses", "--angles", "--robot", "--camera", "--lens", "--camera-info"}) {
+    const CLI::Option* option = verb.get_option_no_throw(name);
+    if (option != nullptr && option->count() > 0)
+      throw data::InputError(std::string(name) + ": found pairs of poses, " + dataset.source +
+                             ", expected pictures of the target beside it");
+  }
 }
 
 void expect_pictures(const calib::Dataset& dataset) {

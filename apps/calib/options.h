@@ -62,6 +62,9 @@ std::string options_file(const CalibCommonOptions& options);
 std::vector<std::string> files_read(const DatasetChoice& choice, const calib::Dataset& dataset,
                                     const CalibCommonOptions& options);
 
+/// Throws data::InputError where the dataset is pairs of poses, and the verb was given an option of pictures.
+void expect_no_picture_options(const CLI::App& verb, const calib::Dataset& dataset);
+
 /// Throws data::InputError where the dataset is pairs of poses.
 void expect_pictures(const calib::Dataset& dataset);
 

@@ -120,7 +120,7 @@ void add_plan_verb(CLI::App& app, Action& action) {
   add_vector_option(*verb, "--upper", options->upper, "Greatest x,y,z of the gripper in the base [m]");
   verb->add_option("--reach", options->settings.reach,
                    "How far beyond the poses used, where the bounds allow [m]")
-      ->check(number_from(0))
+      ->check(number_between(0, 10))
       ->capture_default_str();
   verb->add_option("--criterion", options->criterion,
                    "trace: sum of variances; determinant: volume of the region")

@@ -228,6 +228,51 @@ void expect_one_lens(const std::vector<Recording>& recordings) {
     }
 }
 
+bool same_bytes(const std::string& one, const std::string& other) {
+  std::error_code error;
+  return fs::file_size(one, error) == fs::file_size(other, error) && !error &&
+         data::read_file(one) == data::read_file(other);
+}
+
+/// One recording is one witness, under whatever names its pictures stand.
+void expect_different(const Recording& one, const Recording& other) {
+  for (const calib::Frame& a : one.dataset.frames)
+    for (const calib::Frame& b : other.dataset.frames)
+      if (a.T_base_gripper.isApprox(b.T_base_gripper) && same_bytes(a.image, b.image))
+        throw data::InputError(other.source + ": its picture " + b.name + " is picture " + a.name + " of " +
+                               one.source +
+                               ", at the same pose, expected each once: twice would count as two");
+}
+
+/// Pictures of several cameras that have one number are of one pose. Those that are not count by themselves.
+void warn_of_numbers(const Recording& one, const Recording& other, Doubts& doubts) {
+  constexpr double kSame = 1e-6;
+  std::size_t common = 0, apart = 0;
+  double farthest = 0;  // [m]
+  for (const calib::Frame& a : one.dataset.frames)
+    for (const calib::Frame& b : other.dataset.frames) {
+      if (a.stamp != b.stamp) continue;
+      ++common;
+      if (a.T_base_gripper.isApprox(b.T_base_gripper, kSame)) continue;
+      ++apart;
+      farthest = std::max(farthest, (a.T_base_gripper.translation() - b.T_base_gripper.translation()).norm());
+    }
+  if (apart == 0) return;
+  doubts.add(
+      other.source,
+      {std::to_string(apart) + " of " + std::to_string(common) + " pictures have the numbers of those of " +
+       one.source + ", and other poses of the robot, up to " + data::format_short(1e3 * farthest) +
+       " mm from them, expected picture 7 of every camera at pose 7: each counts by itself"});
+}
+
+void check_recordings(const std::vector<Recording>& recordings, bool of_cameras, Doubts& doubts) {
+  for (std::size_t i = 0; i < recordings.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      expect_different(recordings[j], recordings[i]);
+      if (of_cameras) warn_of_numbers(recordings[j], recordings[i], doubts);
+    }
+}
+
 /// All recordings are read before the first is solved: the result must not take the place of one.
 calib::Cell solved_cell(std::vector<Recording> recordings, const RegisterOptions& options, Doubts& doubts) {
   std::vector<std::string> read = options.calibrations;
@@ -238,6 +283,7 @@ calib::Cell solved_cell(std::vector<Recording> recordings, const RegisterOptions
   }
   expect_own_files({options.out}, read);
   expect_one_lens(recordings);
+  check_recordings(recordings, !options.cameras.empty(), doubts);
   std::vector<calib::CellRecording> solved;
   for (const Recording& recording : recordings) solved.push_back(solved_recording(recording, options));
   const std::vector<std::string> settled = calib::settle_motions(solved);

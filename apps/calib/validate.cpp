@@ -176,7 +176,7 @@ data::PosedLens lens_of(const calib::Extrinsics& extrinsics, const calib::Datase
                           choice);
 }
 
-int run_validate(ValidateOptions options) {
+int run_validate(const CLI::App& verb, ValidateOptions options) {
   std::string own;
   const data::LensChoice choice = data::parse_lens_choice(options.lens, own);
   expect_no_camera({.own = own}, options.dataset.camera);
@@ -185,9 +185,11 @@ int run_validate(ValidateOptions options) {
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::Dataset dataset = load_dataset(options.dataset);
+  expect_no_picture_options(verb, dataset);
   std::vector<std::string> read = files_read(options.dataset, dataset, options.common);
   read.push_back(options.extrinsics);
   expect_own_files(files_written(dataset, options.out), read);
+  expect_folder_apart(options.out, read);
   const bool pairs = dataset.frames.front().T_camera_target.has_value();
   if (dataset.setup && *dataset.setup != extrinsics.setup)
     throw data::InputError(dataset.source + ": found " + calib::to_string(*dataset.setup) + ", expected " +
@@ -267,7 +269,8 @@ void add_validate_verb(CLI::App& app, Action& action) {
       "Example:\n"
       "  flash-calib validate another_recording --target chessboard:9x6:0.025 --extrinsics camera.json -o "
       "checked");
-  verb->callback([options, &action] { action = [options] { return run_validate(*options); }; });
+  verb->callback(
+      [verb, options, &action] { action = [verb, options] { return run_validate(*verb, *options); }; });
 }
 
 }  // namespace flash

@@ -51,4 +51,14 @@ void expect_own_files(const std::vector<std::string>& written, const std::vector
   }
 }
 
+void expect_folder_apart(const std::string& folder, const std::vector<std::string>& read) {
+  if (folder.empty()) return;
+  std::string within = whole_path(folder);
+  if (!within.ends_with('/')) within += '/';
+  for (const std::string& path : read)
+    if (whole_path(path).starts_with(within))
+      throw data::InputError(folder + ": holds " + path +
+                             ", which is read by this run; expected another folder for the result");
+}
+
 }  // namespace flash

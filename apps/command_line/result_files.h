@@ -8,4 +8,7 @@ namespace flash {
 /// links and folders its path goes through. Throws data::InputError.
 void expect_own_files(const std::vector<std::string>& written, const std::vector<std::string>& read);
 
+/// A folder to write that is there already holds none of the files `read`. Throws data::InputError.
+void expect_folder_apart(const std::string& folder, const std::vector<std::string>& read);
+
 }  // namespace flash

@@ -214,7 +214,7 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--heading", options->heading_degrees,
                    "Direction of the sheet's diagonal from the grasped corner, turned from x [deg]; without "
                    "it towards the clouds")
-      ->check(any_number());
+      ->check(number_between(-360, 360));
   verb->add_option("--offset-bound", options->offset, "Bound on the camera's offset, one or x,y,z [m]");
   verb->add_option("--yaw-bound", settings.nuisance.yaw, "Bound on the camera's yaw [rad]")
       ->check(number_from(0));

@@ -62,6 +62,24 @@ void set_sigma(const std::string& assignment, sysid::Objective& objective) {
   *sigma = *value;
 }
 
+/// Noise of each kind of observation, stated once.
+void set_sigmas(const std::vector<std::string>& assignments, sysid::Objective& objective) {
+  std::set<std::string> names;
+  for (const std::string& assignment : assignments) {
+    set_sigma(assignment, objective);
+    if (const std::string name = assignment.substr(0, assignment.find('=')); !names.insert(name).second)
+      throw data::InputError("--sigma " + name + ": given twice, expected one value");
+  }
+}
+
+/// Throws InputError where an option is of another --distance than the one that is taken.
+void check_distance(const CLI::App& verb, const std::string& distance) {
+  for (const auto& [option, of] : {std::pair("--trim", "trimmed"), std::pair("--huber", "huber")})
+    if (verb.count(option) > 0 && distance != of)
+      throw data::InputError(std::string(option) + ": found --distance " + distance +
+                             ", expected --distance " + of + " beside it");
+}
+
 /// As though the asset itself held the constants.
 data::Asset with_fixed(data::Asset asset, const std::vector<sysid::Axis>& fixed) {
   for (const sysid::Axis& axis : fixed) {
@@ -192,6 +210,7 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
 }
 
 sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions& options, int threads) {
+  check_distance(verb, options.distance);
   sysid::ReplaySettings settings;
   settings.solver.time_step = options.time_step;
   settings.solver.max_iterations = options.iterations;
@@ -218,7 +237,7 @@ sysid::ScoreSettings score_settings(const ReplayOptions& options) {
                                                                  : sysid::RobustKind::trimmed;
   settings.objective.robust.trim_fraction = options.trim;
   settings.objective.robust.huber_delta = options.huber;
-  for (const std::string& assignment : options.sigmas) set_sigma(assignment, settings.objective);
+  set_sigmas(options.sigmas, settings.objective);
   settings.objective.two_sided = options.two_sided;
   const auto shares = [&](const char* name) {
     return std::find(options.shared.begin(), options.shared.end(), name) != options.shared.end();
@@ -451,9 +470,11 @@ bool ProgressLine::due(double share) {
 
 void ProgressLine::show(const sysid::Progress& progress, std::optional<double> seconds_left) {
   if (!due(static_cast<double>(progress.done) / std::max(1, progress.total))) return;
-  char line[160];
-  std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, best %.2f mm%s", progress.done,
-                progress.total, progress.candidates_per_second, 1000 * progress.best_score,
+  char line[160], best[40] = "none has a score";
+  if (std::isfinite(progress.best_score))
+    std::snprintf(best, sizeof best, "best %.2f mm", 1000 * progress.best_score);
+  std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, %s%s", progress.done, progress.total,
+                progress.candidates_per_second, best,
                 seconds_left ? (", with the answer " + left_text(*seconds_left)).c_str() : "");
   draw(line);
 }

@@ -102,24 +102,29 @@ nlohmann::ordered_json plan_json(const std::vector<sysid::PlannedExperiment>& ex
 }
 
 // A search brings its own parameters, and what it held.
-void check_options(const PlanOptions& options) {
+void check_options(const CLI::App& verb, const PlanOptions& options) {
   expect_ending("--out", options.out, {".json"});
   if (options.run.empty()) return;
   const std::string beside = ": found it beside --run, whose search has its own, expected one of the two";
   if (!options.axes.empty()) throw data::InputError(sysid::option_of(options.axes.front().first) + beside);
   if (!options.holds.empty()) throw data::InputError("--hold" + beside);
+  for (const std::string name : {"--error", "--keyframes"})
+    if (verb.count(name) > 0) throw data::InputError(name + beside);
 }
 
 int run_plan(const CLI::App& verb, const PlanOptions& options) {
   stop_on_signals();
-  check_options(options);
+  check_options(verb, options);
   const int threads = thread_count(options.common);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   for (const data::Recording& recording : recordings)
     if (recording.is_solid())
       throw data::input_error(recording.source, "object.mesh",
                               "found a solid, expected a sheet: plan knows experiments with sheets alone");
-  const data::Asset asset = load_asset_for(options.asset, recordings.front());
+  std::optional<sysid::SearchFolder> found;
+  if (!options.run.empty()) found = sysid::load_search_folder(options.run);
+  const data::Asset asset = load_asset_for(
+      options.asset.empty() && found ? found->summary.asset : options.asset, recordings.front());
   check_kind(asset, recordings.front());
   const sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   if (!replay.mesh.empty()) recordings.front() = sysid::make_replay(recordings.front(), replay).recording;
@@ -138,13 +143,12 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     sysid::check_axes(all, settings.grid.base);
     settings.at = sysid::values_in_range(settings.grid.base, settings.grid.axes);
   } else {
-    const sysid::SearchFolder found = sysid::load_search_folder(options.run);
-    if (found.summary.samples.rows() < 2 || found.summary.recordings.empty())
+    if (found->summary.samples.rows() < 2 || found->summary.recordings.empty())
       throw data::InputError(options.run +
                              ": found no posterior, expected a search that came to an estimate");
-    if (found.summary.exit_code == exit_unusable)
-      warn(options.run + " is a search that cannot be used: " + found.summary.warnings.front());
-    sysid::start_plan(found, settings);
+    if (found->summary.exit_code == exit_unusable)
+      warn(options.run + " is a search that cannot be used: " + found->summary.warnings.front());
+    sysid::start_plan(*found, settings);
   }
   data::check_file_free(options.out, options.common.force);
   // Refused before anything is simulated.
@@ -208,7 +212,8 @@ void add_plan_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recordings,
                    "Folders with recording.json: the sheet, and what is there already")
       ->required();
-  verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
+  verb->add_option("--asset", options->asset,
+                   "The object; without one, that of --run, or the asset the recording names");
   verb->add_option("--run", options->run,
                    "Folder of a search: its parameters, what it left unknown of them, its noise and misfit");
   verb->add_option("--error", options->error, "Distance by which model and sheet differ in a keyframe [m]")

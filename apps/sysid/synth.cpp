@@ -23,6 +23,7 @@
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 #include "sysid/capture/track_twin.h"
+#include "sysid/replay/recorded_grasp.h"
 
 namespace flash {
 namespace {
@@ -209,6 +210,7 @@ int run_synth(SynthOptions options) {
   const sysid::MaterialBase base = material_base(asset, sim::make_sheet(mesh), notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
+  sysid::check_patch_size(options.synth.grasp_within, mesh);
   check_places(options);
   for (const std::string& notice : notices) say(options.common, notice);
 

@@ -158,6 +158,26 @@ void tell_size(Calibration& result, const std::vector<PoseLoop>& loops, const Ca
   tell_first(result, text, depends && !settings.size_as_stated);
 }
 
+/// Robot and target that are exchanged close as well, and so do both inverted. What tells it is where a
+/// camera can see a target: before it, and not far off its axis.
+void tell_unseen(Calibration& result, const std::vector<Observation>& observations) {
+  constexpr double kSteepest = 3.7;  // tangent of 75 deg
+  std::size_t count = 0, unseen = 0;
+  for (const Observation& observation : observations) {
+    if (observation.T_camera_target.empty()) continue;
+    const Eigen::Vector3d t = observation.T_camera_target.front().translation();
+    ++count;
+    unseen += t.z() > 0 && t.head<2>().norm() < kSteepest * t.z() ? 0 : 1;
+  }
+  constexpr std::size_t kFew = 10;  // one in so many may be an outlier
+  if (kFew * unseen <= count) return;
+  tell_first(result,
+             "the target is behind the camera, or more than 75 deg off its axis, in " +
+                 std::to_string(unseen) + " of " + std::to_string(count) +
+                 " pairs, where no camera sees it: are the poses of robot and target exchanged, or inverted?",
+             false);
+}
+
 }  // namespace
 
 Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
@@ -196,6 +216,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   check_halves(result, loops, places);
   finish(result, observations);
   tell_size(result, loops, settings);
+  tell_unseen(result, observations);
   result.warnings.emplace_back(
       "pairs of poses tell the scatter alone: what the errors of an arm's model have in common is not in the "
       "stated standard deviations; pictures tell of it");

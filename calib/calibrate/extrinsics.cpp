@@ -85,6 +85,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject object(file, path);
   const data::CameraPose pose = data::read_camera_pose(object, accept_unusable);
+  data::expect_near(path, pose.transform.T);
   Extrinsics extrinsics;
   extrinsics.setup = parse_setup(object.string("setup"), path, "setup");
   extrinsics.method = object.string("method");

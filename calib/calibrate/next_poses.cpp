@@ -85,10 +85,17 @@ std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const PlanSettin
       throw data::InputError("plan: --lower " + data::format_short(settings.lower[k]) + " is above --upper " +
                              data::format_short(settings.upper[k]) + " along " + "xyz"[k]);
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(settings.reach);
-  lower = (lower - reach).cwiseMax(settings.lower);
-  upper = (upper + reach).cwiseMin(settings.upper);
-  if ((lower.array() > upper.array()).any())
-    throw data::InputError("plan: the bounds lie outside of what the poses so far can reach");
+  lower -= reach;
+  upper += reach;
+  for (Eigen::Index k = 0; k < 3; ++k)
+    if (settings.lower[k] > upper[k] || settings.upper[k] < lower[k])
+      throw data::InputError("plan: --lower, --upper: found " + data::format_short(settings.lower[k]) +
+                             " to " + data::format_short(settings.upper[k]) + " m along " + "xyz"[k] +
+                             ", expected to meet what the poses so far can reach, " +
+                             data::format_short(lower[k]) + " to " + data::format_short(upper[k]) +
+                             " m; --reach says how far beyond them");
+  lower = lower.cwiseMax(settings.lower);
+  upper = upper.cwiseMin(settings.upper);
   const Eigen::Matrix3d mean = mean_pose(used).linear();
   std::mt19937 random(settings.seed);
   std::uniform_real_distribution<double> uniform(0, 1);

@@ -34,10 +34,11 @@ bool is_sound(const Sighting& sighting, int points) {
                      [](const Eigen::Vector2d& pixel) { return pixel.cwiseAbs().maxCoeff() < kFarthest; });
 }
 
-/// Of all other fields.
-std::string digest_of(nlohmann::json json) {
+/// Of all other fields, and of the name, which is of the picture.
+std::string digest_of(nlohmann::json json, const std::string& path) {
   json.erase("digest");
-  return data::sha256(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return data::sha256(std::filesystem::path(path).filename().string() +
+                      json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
 /// points: of the target. None where the file is not there, or is not as it was written.
@@ -46,7 +47,7 @@ std::optional<Found> read(const std::string& path, int points) {
   if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
   try {
     const nlohmann::json json = data::load_json(path);
-    if (json.at("digest") != digest_of(json)) return std::nullopt;
+    if (json.at("digest") != digest_of(json, path)) return std::nullopt;
     Found found;
     found.reason = json.at("reason").get<std::string>();
     for (const nlohmann::json& item : json.at("sightings")) {
@@ -70,7 +71,7 @@ void write(const Found& found, const std::string& path) {
     json["sightings"].push_back(
         {{"refiner", sighting.refiner}, {"points", sighting.points}, {"pixels", std::move(pixels)}});
   }
-  json["digest"] = digest_of(json);
+  json["digest"] = digest_of(json, path);
   data::write_atomically(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 

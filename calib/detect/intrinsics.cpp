@@ -6,6 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "calib/dataset/same_picture.h"
 #include "calib/dataset/target_shape.h"
 #include "calib/detect/lens_fit.h"
 #include "calib/geometry/pose.h"
@@ -126,7 +127,11 @@ std::vector<std::string> warnings_of(const IntrinsicsEstimate& estimate, std::si
     warnings.push_back(
         "the target is never tilted by more than " + data::format_short(estimate.tilt * 180 / M_PI) +
         " deg between views: focal length and distance cannot be told apart; add views tilted by 30 deg");
-  if (estimate.sd[0] > 0.005 * camera.fx)
+  if (const double share = std::max(estimate.sd[0] / camera.fx, estimate.sd[1] / camera.fy);
+      share > most_focal_sd)
+    warnings.push_back("the focal length is known to " + percent(share) +
+                       " only, which is no answer: add views that are closer and tilted");
+  else if (estimate.sd[0] > 0.005 * camera.fx)
     warnings.push_back("the focal length is known to " + percent(estimate.sd[0] / camera.fx) +
                        " only: add views that are closer and tilted");
   if (estimate.corner_sd > 1)
@@ -162,6 +167,13 @@ IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<
     if (observation.points.size() < 6 && target.kind != TargetKind::aruco &&
         target.kind != TargetKind::apriltag) {
       estimate.views.back().reason = "shows only " + std::to_string(observation.points.size()) + " points";
+      continue;
+    }
+    const auto copied = std::find_if(views.begin(), views.end(), [&](const Observation* view) {
+      return of_same_picture(*view, observation);
+    });
+    if (copied != views.end()) {
+      estimate.views.back().reason = "a copy of " + (*copied)->image;
       continue;
     }
     place.push_back(estimate.views.size() - 1);

@@ -27,6 +27,9 @@ struct IntrinsicsView {
 /// A deviation of so much says that nothing is known: it is printed as "100 px or more".
 inline constexpr double most_corner_sd = 100;  // [px]
 
+/// A focal length that is known to no better than this share of it is no answer.
+inline constexpr double most_focal_sd = 0.05;
+
 struct IntrinsicsEstimate {
   data::CameraIntrinsics camera;
   IntrinsicsVector sd =
@@ -42,11 +45,14 @@ struct IntrinsicsEstimate {
   double tilt = 0;         ///< largest angle between the target's normals of two views [rad]
   std::vector<IntrinsicsView> views;
   std::vector<std::string> warnings;  ///< what these pictures do not determine
+
+  /// Whether the focal lengths are known to better than most_focal_sd.
+  bool usable() const { return sd[0] <= most_focal_sd * camera.fx && sd[1] <= most_focal_sd * camera.fy; }
 };
 
-/// Camera from views of a flat target (Zhang 2000, by OpenCV), views that do not fit left out; then of one
-/// that is not quite flat (fit_lens). Points and pixels of the observations alone are used. Throws
-/// data::InputError below three usable views.
+/// Camera from views of a flat target (Zhang 2000, by OpenCV), views that do not fit and copies left out;
+/// then of one that is not quite flat (fit_lens). Points and pixels of the observations alone are used.
+/// Throws data::InputError below three usable views.
 IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<Observation>& observations,
                                         int width, int height, const IntrinsicsSettings& settings = {});
 

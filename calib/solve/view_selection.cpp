@@ -4,17 +4,12 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/dataset/same_picture.h"
 #include "calib/geometry/pose.h"
 #include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {
-
-/// The same picture twice: noise alone would move some corner by more.
-bool same_pixels(const Observation& a, const Observation& b) {
-  constexpr double kSame = 1e-6;
-  return a.pixels.cols() > 0 && a.points == b.points && (a.pixels - b.pixels).cwiseAbs().maxCoeff() < kSame;
-}
 
 /// The same pair of poses twice, of a set without pictures.
 bool same_pair(const Observation& a, const Observation& b) {
@@ -39,7 +34,7 @@ void drop_unusable(const std::vector<Observation>& observations, std::vector<Vie
     for (std::size_t j = 0; j < i && views[i].used; ++j) {
       if (!views[j].used) continue;
       const bool pair = same_pair(observations[i], observations[j]);
-      if (!pair && !same_pixels(observations[i], observations[j])) continue;
+      if (!pair && !of_same_picture(observations[i], observations[j])) continue;
       const bool moved_robot = motion_between(observations[i].T_base_gripper, observations[j].T_base_gripper)
                                    .cwiseAbs()
                                    .maxCoeff() > 1e-6;

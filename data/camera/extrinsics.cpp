@@ -148,13 +148,17 @@ CameraPose load_camera_pose(const std::string& path, bool accept_unusable) {
     pose.transform = {.parent = "base", .child = "camera", .T = first_pose(path)};
     if (!json_file) pose.lens = find_lens_remark(read_file(path), path);
   }
+  expect_near(path, pose.transform.T);
+  return pose;
+}
+
+void expect_near(const std::string& path, const Eigen::Isometry3d& camera) {
   constexpr double kFarthest = 20;  // from which no camera of a cell looks on [m]
-  if (const double distance = pose.transform.T.translation().norm(); distance > kFarthest)
+  if (const double distance = camera.translation().norm(); distance > kFarthest)
     throw input_error(path, "translation",
                       "found a camera " + format_short(distance) +
-                          " m from the robot's base, expected at most " + format_short(kFarthest) +
+                          " m from the robot's frame, expected at most " + format_short(kFarthest) +
                           " m: are these millimetres?");
-  return pose;
 }
 
 }  // namespace flash::data

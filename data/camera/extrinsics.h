@@ -35,6 +35,10 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable);
 /// of a remark in it (lens_remark). A camera on the gripper is refused too.
 CameraPose load_camera_pose(const std::string& path, bool accept_unusable);
 
+/// Throws InputError, naming `path`, where a camera is farther from the robot's frame than any of a cell is,
+/// 20 m: mostly these are millimetres. load_camera_pose does so itself.
+void expect_near(const std::string& path, const Eigen::Isometry3d& camera);
+
 /// The field "warnings" of a calibration, or of what was made with one; empty where it is absent.
 std::vector<std::string> read_warnings(const JsonObject& file);
 

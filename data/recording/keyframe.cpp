@@ -161,6 +161,25 @@ std::string empty_notice(const Recording& recording, const std::vector<std::size
 
 }  // namespace
 
+namespace {
+
+/// "z 0.008 m and above".
+std::string text_of(const CropBox& crop) {
+  std::string text;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const double low = crop.min[k], high = crop.max[k];
+    if (!std::isfinite(low) && !std::isfinite(high)) continue;
+    text +=
+        (text.empty() ? "" : ", ") + std::string(1, "xyz"[k]) + ' ' +
+        (std::isfinite(low) && std::isfinite(high) ? format_short(low) + " to " + format_short(high) + " m"
+         : std::isfinite(low)                      ? "above " + format_short(low) + " m"
+                                                   : "below " + format_short(high) + " m");
+  }
+  return text.empty() ? "open on all sides" : text;
+}
+
+}  // namespace
+
 std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std::string>& notices) {
   std::vector<Keyframe> keyframes;
   std::vector<std::size_t> empty;
@@ -180,7 +199,8 @@ std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std
     throw input_error(
         recording.source, "keyframes",
         recording.markers.tracks.samples.empty()
-            ? "no keyframe has a point inside the crop box, expected points in metres in the base frame"
+            ? "no keyframe has a point inside the crop box, " + text_of(recording.crop) +
+                  ", expected points in metres in the base frame"
             : "nothing of the object was seen, expected markers that are not in markers.on_support");
   if (largest > 0 && largest < 0.005 * diagonal(recording.mesh.vertices))
     throw input_error(recording.source, "keyframes",

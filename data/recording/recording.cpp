@@ -108,7 +108,7 @@ void read_trajectories(const JsonObject& file, Recording& recording) {
         throw InputError(
             path + ": reaches " + format_short(pose.translation().norm()) +
             " m from the origin, expected metres in the robot's base frame (millimetres read as metres?)");
-    for (const std::string& jumps : find_jumps(trajectory, path)) recording.notices.push_back(jumps);
+    for (const std::string& jumps : find_jumps(trajectory, path)) recording.doubts.push_back(jumps);
     recording.trajectories[name] = trajectory;
     recording.trajectory_paths[name] = path;
   }
@@ -135,6 +135,11 @@ void read_grasps(const JsonObject& file, Recording& recording) {
     grasp.to = object.number("to", kInfinity);
     if (!(grasp.to > grasp.from)) throw object.error("to", "a time after from, or null");
     grasp.select = read_selection(object, recording.mesh.vertices.rows());
+    for (const RecordedGrasp& other : recording.grasps)
+      if (other.gripper == grasp.gripper && other.from < grasp.to && grasp.from < other.to &&
+          other.select.corner == grasp.select.corner && other.select.vertices == grasp.select.vertices &&
+          other.select.position == grasp.select.position && !grasp.select.box)
+        throw object.error("select", "what this gripper does not hold already at that time");
     grasp.shape = read_shape(object);
     grasp.depth = object.positive("depth", grasp.depth);
     if (object.has("direction")) grasp.direction = object.direction("direction", grasp.direction);
@@ -208,6 +213,8 @@ void read_keyframes(const JsonObject& file, Recording& recording) {
     if (object.has("force")) keyframe.force = object.vector("force", 3);
     if (!keyframe.depth.empty() && !recording.camera)
       throw object.error("depth", "a camera in the recording");
+    if (!keyframe.depth.empty() && !keyframe.cloud.empty())
+      throw object.error("depth", "one of cloud and depth");
     if (!keyframe.mask.empty() && keyframe.depth.empty()) throw object.error("mask", "depth beside it");
     if (keyframe.cloud.empty() && keyframe.depth.empty() && keyframe.markers.empty() &&
         keyframe.contour.empty() && !keyframe.force)
@@ -241,8 +248,19 @@ void read_nuisance(const JsonObject& file, Recording& recording) {
   bounds.start_yaw = bound("start_yaw_rad", std::numbers::pi, " rad");
 }
 
+/// A gripper that nothing names moves nothing.
+void doubt_unused(Recording& recording) {
+  for (const auto& [name, trajectory] : recording.trajectories) {
+    const bool used = std::any_of(recording.grasps.begin(), recording.grasps.end(),
+                                  [&](const RecordedGrasp& grasp) { return grasp.gripper == name; });
+    if (!used)
+      recording.doubts.push_back("trajectories." + name + ": no grasp names it, so that it holds nothing");
+  }
+}
+
 void check_times(Recording& recording) {
   const double first = recording.keyframes.front().time, last = recording.keyframes.back().time;
+  const double few = std::max(0.1, 0.05 * (last - first));  // frames before or after the motion are usual [s]
   for (const auto& [name, trajectory] : recording.trajectories) {
     const double begin = trajectory.times.front(), end = trajectory.times.back();
     const std::string spans = "keyframes span " + format_clock(first) + " to " + format_clock(last) +
@@ -252,9 +270,12 @@ void check_times(Recording& recording) {
     if (first > end + slack || last < begin - slack)
       throw input_error(recording.source, "keyframes", spans + ": expected clocks that overlap");
     // Times that differ by the rounding of their files are the same time.
-    if (first < begin - slack - 1e-6 || last > end + slack + 1e-6)
-      recording.notices.push_back(recording.source + ": " + spans +
-                                  ": the gripper stands still outside its trajectory");
+    const double outside = std::max(begin - first, last - end) - slack;
+    const std::string still = spans + ": the gripper stands still outside its trajectory";
+    if (outside > few)
+      recording.doubts.push_back(still);
+    else if (outside > 1e-6)
+      recording.notices.push_back(recording.source + ": " + still);
   }
 }
 
@@ -399,6 +420,7 @@ Recording load_recording(const std::string& path) {
   if (std::any_of(recording.name.begin(), recording.name.end(),
                   [](unsigned char c) { return c < ' ' || c == 0x7f; }))
     throw file.error("name", "a text in one line");
+  if (recording.name.empty()) throw file.error("name", "a text that is not empty");
   recording.kind = file.string("kind", recording.kind);
   const std::vector<std::string> kinds = {"corner_lift", "hang",       "bar_pull", "bias_pull",
                                           "drag",        "cantilever", "free"};
@@ -418,6 +440,7 @@ Recording load_recording(const std::string& path) {
   read_keyframes(file, recording);
   read_nuisance(file, recording);
   check_times(recording);
+  doubt_unused(recording);
   count_from_start(recording);
   if (!file.object("object").has("start") && !recording.markers.placed.empty())
     place_object_by_markers(recording);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "data/asset/asset.h"
 #include "data/camera/depth_map.h"
 #include "data/camera/extrinsics.h"
 #include "data/files/atomic_file.h"
@@ -276,6 +277,7 @@ data::Recording import_recording(const ImportSettings& settings) {
   if (!settings.asset.empty()) {
     if (!fs::exists(settings.asset))
       throw data::InputError("--asset: found \"" + settings.asset + "\", expected a file");
+    data::load_asset(settings.asset);  // says what is wrong with it
     // Named as from the place where the recording will stand.
     recording.asset = (fs::path(staged.path()) / data::relative_path(settings.asset, path)).string();
   }

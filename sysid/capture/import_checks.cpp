@@ -8,6 +8,7 @@
 #include "data/asset/questioned_numbers.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
+#include "sysid/replay/recorded_grasp.h"
 
 namespace flash::sysid {
 namespace {
@@ -31,6 +32,8 @@ struct HeldCloud {
   double lowest = 0;                                 ///< over the table, all but 2 % of the points [m]
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();  ///< from where the tool started, seen from above [m]
   double moved = 0;                                  ///< by the tool, seen from above [m]
+  double highest = 0;                                ///< over the table, all but 2 % of the points [m]
+  Eigen::Vector3d tool = Eigen::Vector3d::Zero();    ///< base frame [m]
 };
 
 std::vector<HeldCloud> held_clouds(const data::Recording& recording,
@@ -51,9 +54,23 @@ std::vector<HeldCloud> held_clouds(const data::Recording& recording,
     held.push_back({*std::min_element(distances.begin(), distances.end()), quantile(distances, 1 - kStray),
                     quantile(heights, kStray),
                     keyframe.cloud.leftCols<2>().colwise().mean().transpose() - start.head<2>(),
-                    (tool - start).head<2>().norm()});
+                    (tool - start).head<2>().norm(), quantile(heights, 1 - kStray), tool});
   }
   return held;
+}
+
+/// Where the cloth is lifted by a gripper that stands still; empty where it is not.
+std::string stuck_gripper(const std::vector<HeldCloud>& held) {
+  constexpr double kStill = 2e-3, kLifted = 0.05;  // [m]
+  double way = 0, low = held.front().highest, high = low;
+  for (const HeldCloud& cloud : held) {
+    way = std::max(way, (cloud.tool - held.front().tool).norm());
+    low = std::min(low, cloud.highest);
+    high = std::max(high, cloud.highest);
+  }
+  if (way > kStill || high - low < kLifted) return "";
+  return "the gripper stands still while the cloth rises by " + metres(high - low) +
+         ": is the trajectory that of this recording?";
 }
 
 }  // namespace
@@ -72,6 +89,7 @@ std::vector<std::string> contradictions(const data::Recording& recording,
   const std::string sheet = metres(size.x()) + " x " + metres(size.y());
 
   std::vector<std::string> found;
+  if (const std::string stuck = stuck_gripper(held); !stuck.empty()) found.push_back(stuck);
   std::vector<double> nearest, farthest, off_table;
   for (const HeldCloud& cloud : held) {
     nearest.push_back(cloud.nearest);
@@ -146,13 +164,7 @@ std::string approach_of(const data::Trajectory& trajectory) {
 
 void check_patch(const data::Recording& recording) {
   const data::Selection& select = recording.grasps.front().select;
-  const double longer =
-      (recording.mesh.vertices.colwise().maxCoeff() - recording.mesh.vertices.colwise().minCoeff())
-          .maxCoeff();
-  if (!select.corner || select.within <= 0.5 * longer) return;
-  throw data::InputError("--grasp-within: found " + data::format_short(select.within) +
-                         " m, expected at most half of the sheet's longer side, " +
-                         data::format_short(0.5 * longer) + " m (25 mm are 0.025)");
+  if (select.corner) check_patch_size(select.within, recording.mesh);
 }
 
 std::string questioned_settings(const data::Recording& recording) {

@@ -9,6 +9,7 @@ namespace flash::sysid {
 /// Where inputs of a recording contradict each other, for people to read, one line each. Cloth is a sheet: no
 /// point of it is farther from the gripper that holds it than the longest way across it.
 ///
+/// - the cloth rises while the gripper stands still;
 /// - the gripper is far from the cloth in most frames, or the cloud reaches farther than the sheet does;
 /// - the gripper starts far above the table, though the sheet lies there in its fingers (grasps of corners);
 /// - the sheet is stated to lie on the other side of the gripper than the clouds do (grasps of corners);

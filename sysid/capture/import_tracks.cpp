@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "data/asset/asset.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
 #include "data/files/json_reader.h"
@@ -88,6 +89,7 @@ data::Recording import_tracks(const TrackImportSettings& settings) {
   if (!settings.asset.empty()) {
     if (!fs::exists(settings.asset))
       throw data::InputError("--asset: found \"" + settings.asset + "\", expected a file");
+    data::load_asset(settings.asset);  // says what is wrong with it
     json["object"]["asset"] = fs::absolute(settings.asset).lexically_normal().string();
   }
   const Json clamp = {{"min", bound_of(settings.clamp.min)}, {"max", bound_of(settings.clamp.max)}};

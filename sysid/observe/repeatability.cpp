@@ -335,7 +335,7 @@ void add_distances(const Trial& from, const RepeatabilitySettings& settings,
 Repeatability measure_repeatability(const data::Recording& first, const data::Recording& second,
                                     const RepeatabilitySettings& settings) {
   if (!(settings.score_from < settings.score_to))
-    throw data::InputError("--from, --to: found " + data::format_short(settings.score_from) + " to " +
+    throw data::InputError("--from, --until: found " + data::format_short(settings.score_from) + " to " +
                            data::format_short(settings.score_to) + " s, expected --from below --until");
   check_same_sheet(first, second);
   const Trial a = trial_of(first, settings), b = trial_of(second, settings);

@@ -77,6 +77,14 @@ data::GraspShape shape_of(const data::RecordedGrasp& grasp, const ReplaySettings
   return settings.grasp_shape.value_or(grasp.shape);
 }
 
+void check_patch_size(double within, const data::TriangleMesh& mesh) {
+  const double longer = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).maxCoeff();
+  if (within <= 0.5 * longer) return;
+  throw data::InputError("--grasp-within: found " + data::format_short(within) +
+                         " m, expected at most half of the sheet's longer side, " +
+                         data::format_short(0.5 * longer) + " m (25 mm are 0.025)");
+}
+
 double held_extent(const Replay& replay, const data::RecordedGrasp& grasp) {
   const data::Points& rest = replay.recording.mesh.vertices;
   const std::vector<int> patch = patch_of(replay, grasp, {});

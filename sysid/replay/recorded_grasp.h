@@ -14,6 +14,10 @@ data::GraspShape shape_of(const data::RecordedGrasp& grasp, const ReplaySettings
 /// The largest distance between two vertices that a grasp of the recording takes, at rest [m].
 double held_extent(const Replay& replay, const data::RecordedGrasp& grasp);
 
+/// Throws data::InputError, naming --grasp-within, unless a patch of so many metres is a corner of the sheet:
+/// at most half of its longer side.
+void check_patch_size(double within, const data::TriangleMesh& mesh);
+
 /// The trajectory of the gripper of a grasp. Throws data::InputError where the recording has none of that
 /// name.
 const data::Trajectory& trajectory_of(const data::Recording& recording, const data::RecordedGrasp& grasp);

@@ -72,9 +72,16 @@ void check_window(const Replay& replay) {
   };
   if (std::none_of(replay.observations.begin(), replay.observations.end(), inside))
     throw data::InputError(
-        "--from, --to: " + replay.recording.source + " has no keyframe between; they span " +
+        "--from, --until: " + replay.recording.source + " has no keyframe between; they span " +
         data::format_clock(replay.observations.front().t) + " to " +
         data::format_clock(replay.observations.back().t) + " s after the recording's start");
+}
+
+/// Throws data::InputError where --grasp-within is more than a corner of the sheet.
+void check_patch(const Replay& replay) {
+  if (!replay.settings.grasp_within || replay.recording.is_solid()) return;
+  for (const data::RecordedGrasp& grasp : replay.recording.grasps)
+    if (grasp.select.corner) check_patch_size(*replay.settings.grasp_within, replay.recording.mesh);
 }
 
 /// Steps from `start` until the last keyframe can have been seen. Throws data::InputError, naming the cause,
@@ -124,6 +131,7 @@ Replay assemble(data::Recording recording_on_mesh, const ReplaySettings& setting
   replay.queries = std::make_shared<const SheetDistance>(replay.surface.triangles, replay.surface.vertices);
   observe(replay);
   check_window(replay);
+  check_patch(replay);
 
   replay.beginning = replay.observations.front().t;
   bool closes = false;

@@ -51,7 +51,7 @@ def overwrites(calib):
     yield [*handeye, "--camera", "left/camera_info.yaml", "-o", "left/camera_info.yaml"], "left/camera_info.yaml"
     yield [calib, "--config", "options.toml", "handeye", "wrist", "-o", "options.toml"], "options.toml"
     for verb in ("detect", "intrinsics", "plan"):
-        for path in ("wrist/images/000.png", "wrist/target.json"):
+        for path in ("wrist/images/000.png", "wrist/target.json", "wrist/poses.tum"):
             yield [calib, verb, "wrist", "-o", path], path
     for path in ("left/camera.json", "right/target.json", "left/images/000.png"):
         yield [calib, "register", "left/camera.json", "right/camera.json", "-o", path], path
@@ -122,8 +122,13 @@ def refusals(calib, work):
     for name, content in (("empty", ""), ("minus", re.sub(r"data: \[", "data: [-", info, count=1)),
                           ("rows", info.replace("rows: 3", "rows: 4", 1)), ("bytes", 'a: "\\\xff"\n')):
         (work / f"{name}.yaml").write_bytes(content.encode("latin-1"))
+    metres = json.loads((work / "wrist/camera.json").read_text())["transform"]["translation"]
+    spoilt(work, "mm.json", lambda c: c["transform"].update(translation=[500 + 1000 * x for x in metres]))
+    shutil.copytree(work / "left", work / "again")
+    (work / "again/images/003.png").unlink()
     validate = [calib, "validate", "wrist", "--extrinsics"]
-    plan = [calib, "plan", "wrist"]
+    plan = [calib, "plan", "wrist", "--cache", "cache"]
+    pairs = [calib, "handeye", "pairs.samples", "--setup", "eye-in-hand"]
     handeye = [calib, "handeye", "wrist"]
     return [
         ([*validate, far], ["far.json: transform.translation", "metres, below 10,000"]),
@@ -138,6 +143,16 @@ def refusals(calib, work):
         ([calib, "detect", "pairs.samples", "--target", BOARD], ["pairs.samples: found pairs of poses, expected pictures"]),
         ([calib, "intrinsics", "pairs.samples"], ["pairs.samples: found pairs of poses, expected pictures"]),
         ([calib, "detect", "wrist", "--target", "chessboard:99999x99999:0.025"], ["COLUMNSxROWS of 3 to 1000"]),
+        ([*validate, "mm.json"], ["mm.json: translation: found a camera ", "are these millimetres?"]),
+        ([*validate, "wrist/camera.json", "--force", "-o", "wrist"], ["wrist: holds wrist/", "expected another folder"]),
+        ([*pairs, "--target", BOARD], ["--target: found pairs of poses, pairs.samples"]),
+        ([*pairs, "--camera-info", "lens.yaml"], ["--camera-info: found pairs of poses"]),
+        ([calib, "validate", "pairs.samples", "--extrinsics", "wrist/camera.json", "--camera", "wrist/camera_info.yaml"],
+         ["--camera: found pairs of poses"]),
+        ([calib, "intrinsics", "wrist", "-o", "lens.json"], ['lens.json", expected a name that ends in .yaml or .yml']),
+        ([calib, "register", "--cameras", "left", "again"], ["again: its picture 000.png is picture 000.png of left"]),
+        ([*plan, "--reach", "1e9"], ["--reach", "expected a number from 0 to 10"]),
+        ([*plan, "--lower", "200,-400,100", "--upper", "700,400,600"], ["--lower, --upper: found 200 to 700 m along x"]),
         ([*handeye, "--poses", "poses.csv"], ["found index, pos_x, pos_y, pos_z", "expected tx, ty, tz [m]"]),
         ([*handeye, "--camera", "empty.yaml"], ["empty.yaml: is empty"]),
         ([*handeye, "--camera", "minus.yaml"], ["found a focal length of -", "expected one above 0"]),

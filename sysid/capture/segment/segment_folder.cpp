@@ -175,6 +175,23 @@ void check_cell(const std::vector<RawView>& views, const std::vector<double>& ti
   result.warnings.push_back(text);
 }
 
+/// Throws InputError where all frames are one while the gripper moves, unless the fault is accepted.
+void expect_moving(const std::string& folder, const std::vector<CellFrame>& frames,
+                   const SegmentFolderSettings& settings) {
+  constexpr double kMoves = 0.02;  // [m]
+  if (!settings.gripper || frames.size() < 2 || settings.accept_fault) return;
+  double way = 0;
+  for (const CellFrame& frame : frames) {
+    const data::Points &first = frames.front().points, &points = frame.points;
+    if (points.rows() != first.rows() || points != first) return;  // noise alone would tell two frames apart
+    way = std::max(way, (*frame.tool - *frames.front().tool).norm());
+  }
+  if (way > kMoves)
+    throw data::InputError(folder + ": its frames are all alike, while the gripper moves by " +
+                           data::format_short(way) +
+                           " m: was it one picture that was saved? --despite-doubts takes them as they are");
+}
+
 std::string tilt_warning(const FoundTable& table) {
   char text[400];
   const Eigen::Vector3d& n = table.plane.normal;
@@ -223,7 +240,9 @@ void take_lens(const data::CameraPose& pose, const std::string& pose_path, const
 }  // namespace
 
 RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
-  if (!fs::is_directory(folder)) throw data::input_error(folder, "folder", "does not exist");
+  if (!fs::is_directory(folder))
+    throw data::input_error(folder, "folder",
+                            fs::exists(folder) ? "is a file, expected a folder" : "does not exist");
   RawView view;
   view.folder = folder;
   view.files = first_with(folder, {"", "clouds", "frames"}, {".ply", ".pcd"});
@@ -298,6 +317,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
     result.warnings.insert(result.warnings.end(), view.warnings.begin(), view.warnings.end());
   const std::vector<CellFrame> sample = sampled_frames(views, times, settings.gripper);
   result.table = table_as_asked(sample, settings);
+  expect_moving(views.front().folder, sample, settings);
   check_cell(views, times, sample, settings, result);
   const auto plane = result.table ? std::optional(result.table->plane) : std::nullopt;
   const std::set<StillCell> still = still_cells(sample, plane, settings.segment);

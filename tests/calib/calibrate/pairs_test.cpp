@@ -219,6 +219,26 @@ TEST(Pairs, WhoseNoiseIsTheCamerasAreAnsweredAndNotCalledTheRobots) {
     }
 }
 
+// Both inverted close as well as they did, and so do robot and target exchanged: where the target stands
+// tells it.
+TEST(Pairs, WhoseTargetNoCameraSeesAreDoubted) {
+  const std::string doubt = "the target is behind the camera";
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand}) {
+    std::vector<Observation> pairs = pairs_of(noisy_scene(setup, 0.3, 1.0, 31));
+    const auto doubted = [&] {
+      const std::vector<std::string> warnings = calibrate_pairs(setup, pairs).warnings;
+      return std::any_of(warnings.begin(), warnings.end(),
+                         [&](const std::string& warning) { return warning.starts_with(doubt); });
+    };
+    EXPECT_FALSE(doubted());
+    for (Observation& pair : pairs) {
+      pair.T_base_gripper = pair.T_base_gripper.inverse();
+      pair.T_camera_target.front() = pair.T_camera_target.front().inverse();
+    }
+    EXPECT_TRUE(setup == Mount::eye_in_hand || doubted());
+  }
+}
+
 TEST(Pairs, OfARobotThatOnlyTurnsDoNotTellTheSize) {
   HandEyeScene scene = noisy_scene(Mount::eye_in_hand, 0.5, 0.5, 21);
   const Eigen::Vector3d place = scene.true_poses.front().translation();

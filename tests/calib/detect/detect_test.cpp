@@ -106,6 +106,28 @@ TEST(Detect, WhatIsKeptIsWhatWasFound) {
             first[0].readings[0].observation.pixels);
 }
 
+TEST(Detect, WhatIsKeptOfAnotherPictureIsFoundAnew) {
+  const data::TemporaryFolder folder;
+  const Target target = parse_target("chessboard:7x5:0.03");
+  const Dataset dataset = write_set(folder, target, 2);
+  DetectSettings settings;
+  settings.cache = folder / "cache";
+  const std::vector<Detection> first = detect(dataset, target, settings);
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "cache"))
+    files.push_back(entry.path().string());
+  ASSERT_EQ(files.size(), 2U);
+  std::filesystem::rename(files[0], folder / "kept");
+  std::filesystem::rename(files[1], files[0]);
+  std::filesystem::rename(folder / "kept", files[1]);
+  std::vector<std::string> told;
+  settings.tell = [&](const std::string& line) { told.push_back(line); };
+  const std::vector<Detection> second = detect(dataset, target, settings);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_EQ(second[i].readings[0].observation.pixels, first[i].readings[0].observation.pixels);
+  EXPECT_EQ(told.size(), 2U);
+}
+
 TEST(Detect, CornersAreThoseOfAnySizeOfTheTarget) {
   const data::TemporaryFolder folder;
   const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 1);

@@ -151,9 +151,21 @@ TEST(Intrinsics, WhatPicturesDoNotDetermineIsSaid) {
   const IntrinsicsEstimate flat = calibrate_intrinsics(target, views(target, 10, 0.05, 0.1, 1), 640, 480);
   ASSERT_FALSE(flat.warnings.empty());
   EXPECT_NE(flat.warnings.front().find("never tilted"), std::string::npos);
+  EXPECT_FALSE(flat.usable());
   std::vector<Observation> few = views(target, 2, 0.5, 0.1, 1);
   EXPECT_NE(data::input_error_of([&] { calibrate_intrinsics(target, few, 640, 480); }).find("found 2"),
             std::string::npos);
+}
+
+TEST(Intrinsics, CopiesOfAPictureTellNothingMore) {
+  const Target target = parse_target("chessboard:9x6:0.025");
+  std::vector<Observation> list = views(target, 10, 0.7, 0.1, 2);
+  const IntrinsicsEstimate once = calibrate_intrinsics(target, list, 640, 480);
+  EXPECT_TRUE(once.usable());
+  list.insert(list.end(), list.begin(), list.begin() + 5);
+  const IntrinsicsEstimate twice = calibrate_intrinsics(target, list, 640, 480);
+  EXPECT_EQ(twice.sd, once.sd);
+  EXPECT_EQ(twice.views[12].reason, "a copy of 2");
 }
 
 TEST(Intrinsics, AViewWithWrongCornersIsLeftOut) {

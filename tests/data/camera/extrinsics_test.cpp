@@ -48,7 +48,7 @@ TEST_F(ExtrinsicsFile, ACameraInMillimetresIsRefused) {
   for (const std::string& path : {json, tum})
     EXPECT_EQ(input_error_of([&] { load_camera_pose(path, true); }),
               path +
-                  ": translation: found a camera 875.2 m from the robot's base, expected at most 20 m: are "
+                  ": translation: found a camera 875.2 m from the robot's frame, expected at most 20 m: are "
                   "these millimetres?");
 }
 

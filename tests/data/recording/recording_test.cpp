@@ -102,6 +102,8 @@ TEST_F(RecordingFiles, TimesCountFromItsStartWhateverTheClock) {
 TEST_F(RecordingFiles, ItsNameIsOneLine) {
   json_["name"] = "two\nlines";
   EXPECT_NE(message().find("name: found"), std::string::npos);
+  json_["name"] = "";
+  EXPECT_NE(message().find("name: found"), std::string::npos);
   json_["name"] = "../../anything else";
   EXPECT_EQ(message(), "");
 }
@@ -280,6 +282,32 @@ TEST_F(RecordingFiles, AGripperInTheMiddleOfAnEdgeIsFarFromEachOfItsVertices) {
   EXPECT_EQ(message(), "");
 }
 
+TEST_F(RecordingFiles, WhatIsThereTwiceIsAnError) {
+  json_["keyframes"][0]["depth"] = "frames/000.ply";
+  json_["camera"] = {{"intrinsics", "lens.yaml"}, {"T_base_camera", {0, 0, 1, 1, 0, 0, 0}}};
+  folder_.write("lens.yaml", "image_width: 8\nimage_height: 6\nK: [50, 0, 4, 0, 50, 3, 0, 0, 1]\n");
+  EXPECT_NE(message().find("keyframes[0].depth"), std::string::npos) << message();
+  json_["keyframes"][0].erase("depth");
+  json_["grasps"].push_back(json_["grasps"][0]);
+  EXPECT_NE(message().find("grasps[1].select"), std::string::npos) << message();
+  json_["grasps"][0]["to"] = 0.2;
+  json_["grasps"][1]["from"] = 0.2;
+  EXPECT_EQ(message(), "");
+}
+
+TEST_F(RecordingFiles, WhatMovesNothingIsDoubted) {
+  EXPECT_TRUE(load().doubts.empty());
+  json_["keyframes"][1]["t"] = 50;
+  std::vector<std::string> doubts = load().doubts;
+  ASSERT_EQ(doubts.size(), 1u);
+  EXPECT_NE(doubts[0].find("keyframes span 0 to 50 s, trajectory gripper 0 to 1 s"), std::string::npos);
+  json_["keyframes"][1]["t"] = 0.5;
+  json_["grasps"] = json::array();
+  doubts = load().doubts;
+  ASSERT_EQ(doubts.size(), 1u);
+  EXPECT_EQ(doubts[0], "trajectories.gripper: no grasp names it, so that it holds nothing");
+}
+
 TEST_F(RecordingFiles, ClocksThatDoNotMeetAreAnError) {
   json_["keyframes"][0]["t"] = 100;
   json_["keyframes"][1]["t"] = 101;
@@ -288,6 +316,8 @@ TEST_F(RecordingFiles, ClocksThatDoNotMeetAreAnError) {
       "keyframes: keyframes span 100 to 101 s, trajectory gripper 0 to 1 s: expected clocks that overlap");
   json_["keyframes"][0]["t"] = 0.5;
   json_["keyframes"][1]["t"] = 1.5;
+  ASSERT_EQ(load().doubts.size(), 1u);
+  json_["keyframes"][1]["t"] = 1.15;  // a frame after the motion
   ASSERT_EQ(load().notices.size(), 1u);
 }
 
@@ -311,9 +341,9 @@ TEST_F(RecordingFiles, MillimetresAreRecognised) {
 
 TEST_F(RecordingFiles, BrokenAndEmptyCloudsAreNamed) {
   json_["keyframes"][0]["cloud"] = "frames/001.ply";
-  EXPECT_EQ(
-      message(),
-      "keyframes: no keyframe has a point inside the crop box, expected points in metres in the base frame");
+  EXPECT_EQ(message(),
+            "keyframes: no keyframe has a point inside the crop box, y below 1 m, z above 0.02 m, expected "
+            "points in metres in the base frame");
   Points cloud = load_point_cloud(folder_ / "frames/000.ply");
   cloud(1, 2) = NAN;
   save_point_cloud(cloud, folder_ / "frames/001.ply");
@@ -347,7 +377,7 @@ TEST_F(RecordingFiles, EmptyKeyframesAreUsualWhileTheSheetStillLies) {
 TEST_F(RecordingFiles, JumpsOfTheGripperAreTold) {
   folder_.write("gripper.tum", "0 0.2 0.2 0 0 0 0 1\n0.5 0.2 0.2 0.1 0 0 0 1\n0.6 10.2 0.2 0.1 0 0 0 1\n");
   EXPECT_EQ(message(), "");
-  EXPECT_NE(load_recording(folder_ / "recording.json").notices.at(0).find("a jump of up to 10 m"),
+  EXPECT_NE(load_recording(folder_ / "recording.json").doubts.at(0).find("a jump of up to 10 m"),
             std::string::npos);
 }
 

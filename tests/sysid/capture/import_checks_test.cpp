@@ -81,6 +81,13 @@ TEST(ImportChecks, ASheetOfAnotherSizeIsNamed) {
             std::string::npos);
 }
 
+TEST(ImportChecks, AGripperThatStandsStillWhileTheClothRisesIsNamed) {
+  data::Recording recording = lift_of(0.15);
+  for (Eigen::Isometry3d& pose : recording.trajectories["gripper"].poses) pose.translation().z() = 0.1;
+  EXPECT_TRUE(
+      said_of(recording, clouds_of(diagonal, 0.15)).starts_with("the gripper stands still while the cloth"));
+}
+
 TEST(ImportChecks, AFlangeForTheToolIsNamed) {
   data::Recording recording = lift_of(0.15);
   for (Eigen::Isometry3d& pose : recording.trajectories["gripper"].poses) pose.translation().z() += 0.1;

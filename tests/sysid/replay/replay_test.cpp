@@ -318,8 +318,9 @@ TEST(Replay, ASimulationWithoutEndIsRefusedWithItsCause) {
               r.keyframes.back().time = 20'000;
             }).find("recording.json: keyframes: "),
             std::string::npos);
-  EXPECT_NE(message_of([](data::Recording&, ReplaySettings& s) { s.score_from = 3; }).find("--from, --to: "),
-            std::string::npos);
+  EXPECT_NE(
+      message_of([](data::Recording&, ReplaySettings& s) { s.score_from = 3; }).find("--from, --until: "),
+      std::string::npos);
 }
 
 TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {

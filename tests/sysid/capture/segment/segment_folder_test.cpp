@@ -244,6 +244,19 @@ TEST_F(SegmentFolder, WhatIsKnownOfTheCellIsHandedOn) {
   EXPECT_TRUE(data::load_trajectory(cell.trajectory).poses[1].isApprox(settings.gripper->poses[1]));
 }
 
+TEST_F(SegmentFolder, OnePictureForAllFramesOfAMotionIsRefused) {
+  write_depth_view(folder("raw"), {0.1, 0.1});
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches({0.1, 0.2});
+  const auto segmented = [&] {
+    segment_folder({open_raw_view(folder("raw"))}, {0.0, 0.1}, settings, folder("out"));
+  };
+  EXPECT_NE(message_of(segmented).find("its frames are all alike, while the gripper moves by 0.1 m"),
+            std::string::npos);
+  settings.accept_fault = true;
+  EXPECT_EQ(message_of(segmented), "no error");
+}
+
 TEST_F(SegmentFolder, CamerasAndGrippersOfOtherCellsAreRefusedAndTheMistakeIsNamed) {
   write_depth_view(folder("raw"), {0.1, 0.2, 0.3});
   SegmentFolderSettings settings;
