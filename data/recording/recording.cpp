@@ -250,7 +250,8 @@ void read_nuisance(const JsonObject& file, Recording& recording) {
 
 /// A gripper that nothing names moves nothing.
 void doubt_unused(Recording& recording) {
-  for (const auto& [name, trajectory] : recording.trajectories) {
+  for (const auto& each : recording.trajectories) {
+    const std::string& name = each.first;
     const bool used = std::any_of(recording.grasps.begin(), recording.grasps.end(),
                                   [&](const RecordedGrasp& grasp) { return grasp.gripper == name; });
     if (!used)
