@@ -164,7 +164,8 @@ TEST(Intrinsics, CopiesOfAPictureTellNothingMore) {
   EXPECT_TRUE(once.usable());
   list.insert(list.end(), list.begin(), list.begin() + 5);
   const IntrinsicsEstimate twice = calibrate_intrinsics(target, list, 640, 480);
-  EXPECT_EQ(twice.sd, once.sd);
+  // But for rounding: threads share the sums otherwise.
+  EXPECT_LE((twice.sd - once.sd).norm(), 1e-9 * once.sd.norm());
   EXPECT_EQ(twice.views[12].reason, "a copy of 2");
 }
 

@@ -266,7 +266,9 @@ TEST_F(ImportFiles, SenselessSettingsAreRefusedByTheirNames) {
 }
 
 TEST_F(ImportFiles, TheAssetIsNamedFromTheRecording) {
-  settings_.asset = folder_.write("towel.json", "{}");
+  settings_.asset = folder_.write("towel.json", R"({"schema": "flash-asset/1", "mesh": "sheet:0.2x0.2:0.02",
+      "element_type": "TRIANGLE", "mechanical_props": {"constitutive": "TRI_COROTATED", "young": 1e5, "poisson": 0.3,
+      "thickness": 0.001, "areal_density": 0.2}})");
   for (const bool again : {false, true}) {
     settings_.overwrite = again;
     EXPECT_EQ(std::filesystem::weakly_canonical(import_recording(settings_).asset),
