@@ -8,7 +8,6 @@
 #include "data/files/error.h"
 #include "data/numbers/worst.h"
 #include "sim/named.h"
-#include "sim/scene/material_values.h"
 #include "sim/scene/scene.h"
 #include "sim/scene_worlds.h"
 #include "sim/tensor_entries.h"
@@ -49,18 +48,6 @@ void merge(const WorldStatus& other, WorldStatus& status) {
   status.penetration = data::worst(status.penetration, other.penetration);
   status.parts = std::max(status.parts, other.parts);
   if (status.lost == 0) status.lost = other.lost;
-}
-
-template <class Material, std::size_t count>
-void set_value(const std::array<MaterialValue<Material>, count>& values, const std::string& name,
-               double number, Material& material) {
-  for (const MaterialValue<Material>& known : values)
-    if (known.name == name) {
-      material.*known.value = number;
-      return;
-    }
-  throw InputError(name + ": found a name that is none of its material, expected " +
-                   listed(names_of(values)));
 }
 
 }  // namespace
@@ -307,47 +294,12 @@ void LiveScene::set_material(const std::string& object, const Chosen& environmen
                              const MaterialNumbers& numbers) {
   Storage& s = *storage_;
   const LiveObject& own = s.object(object);
-  Worlds& worlds = s.worlds[own.worlds];
-  const std::span<const int> chosen = s.chosen_of(environments);
-  for (const auto& [name, values] : numbers)
-    if (values.size() != chosen.size())
-      throw InputError(name + ": found " + std::to_string(values.size()) + " numbers, expected " +
-                       std::to_string(chosen.size()));
-  const auto changed = [&](const auto& values_of, const auto& material_of) {
-    std::vector<std::remove_cvref_t<decltype(material_of(worlds.environment(0)))>> materials;
-    for (std::size_t i = 0; i < chosen.size(); ++i) {
-      materials.push_back(material_of(worlds.environment(chosen[i])));
-      for (const auto& [name, values] : numbers) set_value(values_of, name, values[i], materials.back());
-    }
-    worlds.set_materials(environments, materials, own.body);
-  };
-  if (own.is_solid)
-    changed(solid_values, [&](const Environment& e) { return e.solids.at(own.body); });
-  else
-    changed(sheet_values,
-            [&](const Environment& e) { return e.materials[static_cast<std::size_t>(own.body)]; });
+  set_material_numbers(s.worlds[own.worlds], own.body, own.is_solid, s.chosen_of(environments), numbers);
 }
 
 MaterialNumbers LiveScene::material(const std::string& object) const {
-  const Storage& s = *storage_;
-  const LiveObject& own = s.object(object);
-  MaterialNumbers numbers;
-  const auto add = [&](const auto& values, const auto& material_of) {
-    for (const auto& known : values) {
-      std::vector<double>& column = numbers.emplace_back(known.name, std::vector<double>()).second;
-      for (const int e : s.every)
-        column.push_back(material_of(s.worlds[own.worlds].environment(e)).*known.value);
-    }
-  };
-  if (own.is_solid)
-    add(
-        solid_values, [&](const Environment& e) -> auto& { return e.solids.at(own.body); });
-  else
-    add(
-        sheet_values, [&](const Environment& e) -> auto& {
-          return e.materials[static_cast<std::size_t>(own.body)];
-        });
-  return numbers;
+  const LiveObject& own = storage_->object(object);
+  return material_numbers(storage_->worlds[own.worlds], own.body, own.is_solid);
 }
 
 bool LiveScene::uses_material_friction(const std::string& object) const {

@@ -9,6 +9,7 @@
 #include "data/mesh/mesh.h"
 #include "data/scene/scene.h"
 #include "sim/live_cameras.h"
+#include "sim/material_numbers.h"
 #include "sim/worlds.h"
 
 namespace flash::sim {
@@ -22,9 +23,6 @@ struct LiveObject {
   int body = 0;            ///< of their plan
   std::int64_t first_vertex = 0, vertices = 0;
 };
-
-/// Numbers of a material by name, one for each environment.
-using MaterialNumbers = std::vector<std::pair<std::string, std::vector<double>>>;
 
 /// The objects of a scene in many environments that stay alive, with end effectors that code adds, moves,
 /// closes and opens. What moves by the scene's own file goes on doing so. Of what Worlds promises all holds.

@@ -1,6 +1,5 @@
 #pragma once
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,7 +7,6 @@
 #include "data/asset/asset.h"
 #include "sim/device.h"
 #include "sysid/emulate/grid_search.h"
-#include "sysid/infer/answer_work.h"
 #include "sysid/replay/replay.h"
 
 namespace flash {
@@ -121,26 +119,5 @@ sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sh
 /// Says what is known before a search and makes its answer worse.
 void tell_known_before(const CommonOptions& options, const std::vector<sysid::Replay>& replays,
                        const sysid::GridSettings& settings);
-
-/// Progress with rate and time left on stderr: one line drawn over itself on a terminal, elsewhere a line
-/// each tenth of the way (at most one a second) or half a minute. Silent with --quiet.
-class ProgressLine {
- public:
-  explicit ProgressLine(const CommonOptions& options);
-  ~ProgressLine();
-  /// `seconds_left`: of the whole search, its answer included.
-  void show(const sysid::Progress& progress, std::optional<double> seconds_left);
-  void show(const sysid::AnswerMeter& meter, std::optional<double> seconds_left);
-
- private:
-  using Clock = std::chrono::steady_clock;
-  bool due(double share);
-  void draw(const std::string& line);
-
-  bool visible_, terminal_;
-  bool drawn_ = false;
-  int tenths_ = 0;  ///< of the way, at the last line
-  Clock::time_point begin_ = Clock::now(), last_ = begin_;
-};
 
 }  // namespace flash

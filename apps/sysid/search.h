@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "apps/sysid/options.h"
+#include "apps/sysid/progress_line.h"
 #include "data/asset/asset.h"
 #include "sysid/emulate/results_store.h"
 #include "sysid/infer/answer.h"

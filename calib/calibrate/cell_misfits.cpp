@@ -1,6 +1,7 @@
 #include "calib/calibrate/cell_misfits.h"
 
 #include <algorithm>
+#include <span>
 
 namespace flash::calib {
 namespace {
@@ -16,7 +17,7 @@ struct Witnesses {
   }
 };
 
-Witnesses witnesses_of(const std::vector<CellMember>& members, const std::string& arm, double stamp,
+Witnesses witnesses_of(std::span<const CellMember> members, const std::string& arm, double stamp,
                        const Eigen::Isometry3d& pose) {
   Witnesses witnesses;
   for (const CellMember& member : members) {
@@ -42,7 +43,7 @@ std::vector<std::string> images_of(const std::vector<CellMember>& members, std::
   const CellMember& member = members[at];
   for (const MisfitView& view : member.misfits) {
     if (witnesses_of(members, member.arm, view.stamp, view.T_base_gripper).fault() != fault) continue;
-    const std::vector<CellMember> before(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(at));
+    const std::span before = std::span(members).first(at);
     const bool named = fault == Fault::robot &&
                        witnesses_of(before, member.arm, view.stamp, view.T_base_gripper).against > 0;
     if (!named) images.push_back(view.image);
