@@ -5,9 +5,7 @@
 #include <numeric>
 
 namespace flash::data {
-namespace {
 
-/// Of each vertex, the first one that it hangs together with.
 std::vector<int> first_of_part(const TriangleMesh& mesh) {
   std::vector<int> first(static_cast<std::size_t>(mesh.vertices.rows()));
   std::iota(first.begin(), first.end(), 0);
@@ -26,8 +24,6 @@ std::vector<int> first_of_part(const TriangleMesh& mesh) {
   for (int v = 0; v < mesh.vertices.rows(); ++v) first[static_cast<std::size_t>(v)] = root(v);
   return first;
 }
-
-}  // namespace
 
 std::vector<TriangleMesh> connected_parts(const TriangleMesh& mesh) {
   const std::vector<int> first = first_of_part(mesh);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -12,6 +11,8 @@
 
 #include "data/files/error.h"
 #include "data/files/text.h"
+#include "data/mesh/connected_parts.h"
+#include "data/mesh/enclosed_volume.h"
 #include "data/mesh/mesh_io.h"
 #include "data/mesh/surface_crossing.h"
 #include "data/mesh/weld.h"
@@ -51,34 +52,6 @@ int pinched_vertex(const TriangleMesh& mesh) {
   return -1;
 }
 
-/// Numbers of the parts that hang together over vertices, of each vertex.
-std::vector<int> parts_of(const TriangleMesh& mesh) {
-  std::vector<int> above(static_cast<std::size_t>(mesh.vertices.rows()));
-  std::iota(above.begin(), above.end(), 0);
-  const auto root_of = [&](int vertex) {
-    while (above[static_cast<std::size_t>(vertex)] != vertex)
-      vertex = above[static_cast<std::size_t>(vertex)] =
-          above[static_cast<std::size_t>(above[static_cast<std::size_t>(vertex)])];
-    return vertex;
-  };
-  for (const auto& t : mesh.triangles.rowwise())
-    for (const int corner : {t[1], t[2]}) above[static_cast<std::size_t>(root_of(corner))] = root_of(t[0]);
-  std::vector<int> parts(above.size());
-  for (int v = 0; v < std::ssize(parts); ++v) parts[static_cast<std::size_t>(v)] = root_of(v);
-  return parts;
-}
-
-double volume_of(const TriangleMesh& mesh) {
-  const Eigen::RowVector3d middle = mesh.vertices.colwise().mean();
-  double volume = 0;
-  for (const auto& t : mesh.triangles.rowwise()) {
-    const Eigen::Vector3d a = mesh.vertices.row(t[0]) - middle, b = mesh.vertices.row(t[1]) - middle,
-                          c = mesh.vertices.row(t[2]) - middle;
-    volume += a.cross(b).dot(c) / 6;
-  }
-  return volume;
-}
-
 }  // namespace
 
 void check_crossings(const TriangleMesh& mesh, const std::string& source, std::span<const int> part) {
@@ -116,9 +89,9 @@ ObstacleMesh checked_obstacle_mesh(TriangleMesh mesh, const std::string& source)
                           "); expected one fan of triangles about each vertex");
   }
   // Whole parts may reach into each other, as a chair's legs into its seat: what is in one of them is inside.
-  if (result.closed) check_crossings(result.mesh, source, parts_of(result.mesh));
+  if (result.closed) check_crossings(result.mesh, source, first_of_part(result.mesh));
   if (result.closed)
-    if (const double volume = volume_of(result.mesh); !(volume > 0))
+    if (const double volume = enclosed_volume(result.mesh); !(volume > 0))
       throw InputError(source + ": is inside out: found a volume of " + format_short(volume) +
                        " m^3, expected triangles that run counter-clockwise seen from outside");
   return result;

@@ -19,6 +19,7 @@
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
+#include "data/mesh/enclosed_volume.h"
 #include "data/mesh/mesh_io.h"
 #include "data/mesh/obstacle_mesh.h"
 #include "data/mesh/tet_faces.h"
@@ -92,17 +93,6 @@ std::string reason_in(const std::string& log) {
   return reason.empty() ? "no reason is given" : reason;
 }
 
-double volume_of(const TriangleMesh& mesh) {
-  const Eigen::RowVector3d middle = mesh.vertices.colwise().mean();
-  double volume = 0;
-  for (const auto& t : mesh.triangles.rowwise()) {
-    const Eigen::Vector3d a = mesh.vertices.row(t[0]) - middle, b = mesh.vertices.row(t[1]) - middle,
-                          c = mesh.vertices.row(t[2]) - middle;
-    volume += a.cross(b).dot(c) / 6;
-  }
-  return volume;
-}
-
 void measure(FilledSolid& solid) {
   solid.least_angle = solid.shortest_edge = std::numeric_limits<double>::infinity();
   const Points& x = solid.mesh.vertices;
@@ -137,7 +127,7 @@ FilledSolid filled_solid(const TriangleMesh& surface, double edge, const std::st
                      " edges; expected a closed surface, which has an inside to fill");
   check_crossings(checked.mesh, source);
   FilledSolid result;
-  result.surface_volume = volume_of(checked.mesh);
+  result.surface_volume = enclosed_volume(checked.mesh);
   const double share = edge * edge * edge / (6 * std::sqrt(2));  // of a regular tetrahedron
   if (result.surface_volume / share > most_tetrahedra)
     throw InputError(source + ": " + format_short(result.surface_volume) + " m^3 would take " +
