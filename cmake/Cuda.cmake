@@ -1,10 +1,20 @@
 # Sets FLASH_HAVE_CUDA: whether the CUDA language is enabled. The CPU backend never depends on it.
 set(FLASH_HAVE_CUDA OFF)
-if(FLASH_CUDA)
-  # CMake's own default is compute capability 75 alone. Code of 80 runs on 86 and 89 as well, PTX on later ones.
-  if(NOT CMAKE_CUDA_ARCHITECTURES)
+set(FLASH_CUDA_WANTED ${FLASH_CUDA})
+if(FLASH_CUDA AND NOT CMAKE_CUDA_ARCHITECTURES)
+  # For all devices kernels take long to compile. So they are compiled for the device that is here, and
+  # without one where it is asked for. Code of 80 runs on 86 and 89 as well, PTX on later ones.
+  execute_process(COMMAND nvidia-smi --list-gpus RESULT_VARIABLE no_device OUTPUT_VARIABLE devices ERROR_QUIET)
+  if(no_device EQUAL 0 AND devices)
+    set(CMAKE_CUDA_ARCHITECTURES native)
+  elseif(FLASH_CUDA STREQUAL "AUTO")
+    message(STATUS "No CUDA device here: the CPU alone. FLASH_CUDA=ON compiles for all devices, CMAKE_CUDA_ARCHITECTURES names some")
+    set(FLASH_CUDA_WANTED OFF)
+  else()
     set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 90-real 100-real 120)
   endif()
+endif()
+if(FLASH_CUDA_WANTED)
   # CMake 3.25 does not know nvcc's switch for C++20.
   set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
   set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
