@@ -1,12 +1,9 @@
 #include "sim/live_cameras.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "data/files/error.h"
-#include "data/files/text.h"
-#include "data/motion/trajectory.h"
 #include "data/scene/obstacle_surfaces.h"
 #include "sim/named.h"
 #include "sim/tensor_entries.h"
@@ -17,20 +14,6 @@ using data::InputError;
 using Eigen::Isometry3d;
 
 namespace {
-
-std::vector<Isometry3d> poses_of(std::span<const int> chosen, const Tensor& poses) {
-  constexpr double unit_tolerance = 1e-3;  // as of files of trajectories
-  const double* numbers = entries_of("poses", chosen, poses, {7});
-  std::vector<Isometry3d> all;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const Eigen::Map<const Eigen::Matrix<double, 7, 1>> pose(numbers + 7 * i);
-    if (const double length = pose.tail<4>().norm(); !(std::abs(length - 1) <= unit_tolerance))
-      throw InputError("poses: environment " + std::to_string(chosen[i]) + ": found a quaternion of length " +
-                       data::format_short(length) + ", expected 1");
-    all.push_back(data::from_vector(pose));
-  }
-  return all;
-}
 
 /// Where a frame stands in each environment now.
 std::vector<Isometry3d> poses_now(std::span<const Environment* const> environments, int frame) {
@@ -81,12 +64,12 @@ void LiveCameras::add(const LiveCamera& camera, std::span<const int> every, cons
                  [](const RigidBody& body) { return body.frame != base_frame; });
     frame = moving[number_of("carrier", camera.carrier, names_of(moving))].frame;
   }
-  cameras_.push_back({camera, camera.name, frame, poses_of(every, poses)});
+  cameras_.push_back({camera, camera.name, frame, poses_of("poses", every, poses)});
 }
 
 void LiveCameras::set_poses(const std::string& name, std::span<const int> chosen, const Tensor& poses) {
   const std::size_t number = placed(name);
-  const std::vector<Isometry3d> given = poses_of(chosen, poses);
+  const std::vector<Isometry3d> given = poses_of("poses", chosen, poses);
   for (std::size_t i = 0; i < chosen.size(); ++i)
     cameras_[number].poses[static_cast<std::size_t>(chosen[i])] = given[i];
 }

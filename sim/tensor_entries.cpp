@@ -8,6 +8,7 @@
 
 #include "data/files/error.h"
 #include "data/files/text.h"
+#include "data/motion/trajectory.h"
 
 namespace flash::sim {
 namespace {
@@ -55,6 +56,28 @@ const double* entries_of(const std::string& what, std::span<const int> chosen, c
                                ", expected finite numbers");
     }
   return first;
+}
+
+std::vector<Eigen::Isometry3d> poses_of(const std::string& what, std::span<const int> chosen,
+                                        const Tensor& poses) {
+  constexpr double unit_tolerance = 1e-3;  // as of files of trajectories
+  constexpr double farthest_place = 1e5;   // as of files of scenes [m]
+  const double* numbers = entries_of(what, chosen, poses, {7});
+  std::vector<Eigen::Isometry3d> all;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const Eigen::Map<const Eigen::Matrix<double, 7, 1>> pose(numbers + 7 * i);
+    const auto expect = [&](bool met, const std::string& found) {
+      if (!met)
+        throw data::InputError(what + ": environment " + std::to_string(chosen[i]) + ": found " + found);
+    };
+    const double length = pose.tail<4>().norm(), farthest = pose.head<3>().cwiseAbs().maxCoeff();
+    expect(std::abs(length - 1) <= unit_tolerance,
+           "a quaternion of length " + data::format_short(length) + ", expected 1");
+    expect(farthest <= farthest_place, data::format_short(farthest) + " m, expected at most " +
+                                           data::format_short(farthest_place) + " m");
+    all.push_back(data::from_vector(pose));
+  }
+  return all;
 }
 
 }  // namespace flash::sim

@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -13,5 +14,11 @@ namespace flash::sim {
 /// shape in the memory of the processor.
 const double* entries_of(const std::string& what, std::span<const int> chosen, const Tensor& numbers,
                          const std::vector<std::int64_t>& shape_of_each);
+
+/// Poses of the chosen environments, x y z [m] and the quaternion x y z w of each, as numbers that
+/// entries_of takes. Throws data::InputError likewise, for a quaternion that is not of length 1 too, and for
+/// places farther than files may have them.
+std::vector<Eigen::Isometry3d> poses_of(const std::string& what, std::span<const int> chosen,
+                                        const Tensor& poses);
 
 }  // namespace flash::sim

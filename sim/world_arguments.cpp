@@ -5,8 +5,6 @@
 
 #include "data/files/error.h"
 #include "data/files/text.h"
-#include "data/motion/trajectory.h"
-#include "sim/tensor_entries.h"
 
 namespace flash::sim {
 namespace {
@@ -31,26 +29,6 @@ void check_chosen(const char* setter, std::span<const int> environments, int cou
       refuse_argument(setter, "found " + environment_name(e) + " twice, expected each once");
     found[static_cast<std::size_t>(e)] = true;
   }
-}
-
-std::vector<Eigen::Isometry3d> poses_of(const char* setter, std::span<const int> chosen,
-                                        const Tensor& poses) {
-  constexpr double unit_tolerance = 1e-3;  // as of files of trajectories
-  const double* numbers = entries_of("worlds: " + std::string(setter) + ": poses", chosen, poses, {7});
-  std::vector<Eigen::Isometry3d> all;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const Eigen::Map<const Eigen::Matrix<double, 7, 1>> pose(numbers + 7 * i);
-    const auto expect = [&](bool met, const std::string& what) {
-      if (!met) refuse_argument(setter, "poses: " + environment_name(chosen[i]) + ": " + what);
-    };
-    const double length = pose.tail<4>().norm(), farthest = pose.head<3>().cwiseAbs().maxCoeff();
-    expect(std::abs(length - 1) <= unit_tolerance,
-           "found a quaternion of length " + data::format_short(length) + ", expected 1");
-    expect(farthest <= farthest_place, "found " + data::format_short(farthest) + " m, expected at most " +
-                                           data::format_short(farthest_place) + " m");
-    all.push_back(data::from_vector(pose));
-  }
-  return all;
 }
 
 void check_end_effector(const EndEffector& effector) {

@@ -21,10 +21,6 @@ std::string environment_name(int environment);
 /// Refuses numbers that are not from 0 to `count` - 1, each once.
 void check_chosen(const char* setter, std::span<const int> environments, int count);
 
-/// Poses of the chosen environments, x y z [m] and the quaternion x y z w of each. Refuses what is not rigid
-/// or farther than files may have it.
-std::vector<Eigen::Isometry3d> poses_of(const char* setter, std::span<const int> chosen, const Tensor& poses);
-
 /// Refuses a box without a size, and a threshold or a friction that is none.
 void check_end_effector(const EndEffector& effector);
 

@@ -197,7 +197,7 @@ int Worlds::size() const { return storage_->size(); }
 EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses) {
   Storage& s = *storage_;
   check_end_effector(effector);
-  const std::vector<Eigen::Isometry3d> at = poses_of("add", s.every, poses);
+  const std::vector<Eigen::Isometry3d> at = poses_of("worlds: add: poses", s.every, poses);
   const auto frames_of = [](const World& world) { return world.plan ? std::ssize(world.plan->frames) : 0; };
   for (const int e : s.every) {
     const World &world = s.at(e), &first = s.at(0);
@@ -245,7 +245,7 @@ void Worlds::set_poses(const Chosen& environments, int frame, const Tensor& pose
                                        ", expected one of the " + std::to_string(frames) +
                                        " of its schedule");
   }
-  const std::vector<Eigen::Isometry3d> at = poses_of("set_poses", chosen, poses);
+  const std::vector<Eigen::Isometry3d> at = poses_of("worlds: set_poses: poses", chosen, poses);
   for (std::size_t i = 0; i < chosen.size(); ++i) set_pose(s.at(chosen[i]), frame, at[i], s.time_step());
 }
 

@@ -260,9 +260,10 @@ std::string given_twice(const CLI::App& app) {
 std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
   std::vector<std::string> known;
   for (const CLI::App* verb : app.get_subcommands()) collect_options(*verb, known);
-  // What was misspelt may be what is missing.
+  // What was misspelt may be what is missing; the value of an unknown option is a word too many.
   const bool of_names = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr ||
-                        dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
+                        dynamic_cast<const CLI::RequiredError*>(&error) != nullptr ||
+                        dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr;
   for (int i = 2; i < argc && of_names; ++i) {
     const std::string word(argv[i], std::strcspn(argv[i], "="));
     if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;

@@ -42,6 +42,9 @@ double time_of(const std::string& frame, const data::Scene& scene) {
   if (!step || name.find_first_not_of("0123456789") != std::string::npos)
     throw data::InputError("--scene: found it beside " + frame +
                            ", expected a frame of a run of that scene, as out/frames/000500.ply");
+  if (*step > scene.steps)
+    throw data::InputError(frame + ": found step " + data::format_short(*step) + ", expected at most the " +
+                           std::to_string(scene.steps) + " of " + scene.source + " (--scene)");
   return *step * scene.time_step;
 }
 
@@ -56,10 +59,11 @@ void check_frame(const std::string& frame, const data::Scene& scene) {
 }
 
 /// Adds what the scene stands on, in grey, and turns all so that gravity points down.
-void add_scene(const std::string& path, const std::string& frame, std::vector<data::PicturedMesh>& pictured) {
+void add_scene(const std::string& path, const std::vector<std::string>& frames,
+               std::vector<data::PicturedMesh>& pictured) {
   const data::Scene scene = data::load_scene(path);
-  const double time = time_of(frame, scene);
-  check_frame(frame, scene);
+  const double time = time_of(frames.front(), scene);
+  for (const std::string& frame : frames) check_frame(frame, scene);
   Eigen::AlignedBox3d about;
   for (const data::PicturedMesh& each : pictured)
     for (const auto& vertex : each.mesh.vertices.rowwise()) about.extend(vertex.transpose());
@@ -82,7 +86,7 @@ int picture(const PictureOptions& options) {
     for (data::TriangleMesh& part : data::connected_parts({geometry.points, geometry.triangles}))
       pictured.push_back({std::move(part), of_objects[pictured.size() % of_objects.size()]});
   }
-  if (!options.scene.empty()) add_scene(options.scene, options.meshes.front(), pictured);
+  if (!options.scene.empty()) add_scene(options.scene, options.meshes, pictured);
   data::save_png(data::draw_meshes(pictured, options.view), options.out);
   return exit_done;
 }

@@ -66,8 +66,8 @@ void add_repeatability_verb(CLI::App& app, Action& action) {
   verb->add_option("recordings", options->recordings, "The folders of two trials with recording.json")
       ->required()
       ->expected(2);
-  verb->add_option("--from", options->from, "Leave out keyframes before this time [s]");
-  verb->add_option("--until", options->to, "Leave out keyframes after this time [s]");
+  verb->add_option("--from", options->from, "Leave out keyframes before this time [s]")->check(any_number());
+  verb->add_option("--until", options->to, "Leave out keyframes after this time [s]")->check(any_number());
   add_common_options(*verb, options->common);
   verb->footer("Example:\n  flash-sysid repeatability lift lift_again --from 1");
   verb->callback(

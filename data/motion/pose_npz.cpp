@@ -89,7 +89,11 @@ std::vector<std::vector<double>> stack_of(const Arrays& arrays, Names names, con
 std::vector<PosePair> load_npz_pairs(const std::string& path) {
   const Arrays named = load_npz(path);
   Arrays arrays;
-  for (const auto& [name, array] : named) arrays.emplace(plain(name), array);
+  for (const auto& [name, array] : named)
+    if (!arrays.emplace(plain(name), array).second)
+      throw InputError(path + ": " + name +
+                       ": found another array of this name but for capitals and signs, "
+                       "expected each once");
   const auto robot = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base"),
              target = stack_of(arrays, kTarget, "rtarget2cam", "ttarget2cam");
   if (robot.empty() || robot.size() != target.size())

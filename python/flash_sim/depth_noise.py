@@ -34,11 +34,13 @@ class DepthNoise:
     def __post_init__(self):
         for name, most in (("blockouts", 1000), ("robot_margin", 1000)):
             arguments.whole_number(f"DepthNoise: {name}", getattr(self, name), 0, most)
-        for name, most in (("blockout_size", 1), ("jitter", 1000), ("flying", 1), ("edge", np.inf), ("grazing", 90),
-                           ("noise", np.inf), ("noise_of_square", np.inf), ("step_of_square", np.inf)):
+        for name, most in (("blockout_size", 1), ("jitter", 1000), ("flying", 1), ("edge", 1e5), ("grazing", 90),
+                           ("noise", 100), ("noise_of_square", 100), ("step_of_square", 100)):
             value = float(arguments.numbers(f"DepthNoise: {name}", getattr(self, name), ()))
             if not 0 <= value <= most:
-                raise ValueError(f"DepthNoise: {name}: found {value:.6g}, expected 0 {'or more' if most == np.inf else f'to {most}'}")
+                raise ValueError(f"DepthNoise: {name}: found {value:.6g}, expected 0 to {most:g}")
+        if 0 < self.step_of_square < 1e-9:
+            raise ValueError(f"DepthNoise: step_of_square: found {self.step_of_square:.6g}, expected 0, or 1e-9 or more")
 
 
 def add_depth_noise(depth: ArrayLike, seed: int, settings: DepthNoise = DepthNoise(), robot: ArrayLike | None = None,
@@ -58,6 +60,8 @@ def add_depth_noise(depth: ArrayLike, seed: int, settings: DepthNoise = DepthNoi
         raise ValueError(f"add_depth_noise: robot: found the shape {before.shape}, expected {clean.shape}")
     if lens is not None:
         lens = arguments.numbers("add_depth_noise: lens", lens, (4,))
+        if not (lens[:2] >= 1e-3).all():
+            raise ValueError(f"add_depth_noise: lens: found the focal lengths {lens[0]:.6g} and {lens[1]:.6g} px, expected 0.001 or more")
     seen = np.empty_like(clean)
     for k, picture in enumerate(clean):
         random = np.random.default_rng([seed, k])
@@ -79,9 +83,9 @@ def jitter_poses(poses: ArrayLike, seed: int, metres: float = 0.0, degrees: floa
     """
     given = arguments.numbers("jitter_poses: poses", poses, (None, 7))
     given = arguments.poses("jitter_poses: poses", given, given)
-    for what, value in (("metres", metres), ("degrees", degrees)):
-        if not arguments.numbers(f"jitter_poses: {what}", value, ()) >= 0:
-            raise ValueError(f"jitter_poses: {what}: found {value}, expected 0 or more")
+    for what, value, most in (("metres", metres, 1e5), ("degrees", degrees, 360)):
+        if not 0 <= arguments.numbers(f"jitter_poses: {what}", value, ()) <= most:
+            raise ValueError(f"jitter_poses: {what}: found {value}, expected 0 to {most:g}")
     random = np.random.default_rng(arguments.whole_number("jitter_poses: seed", seed, 0, 2**63 - 1))
     moved = given[:, :3] + metres * random.standard_normal((len(given), 3))
     turn = np.radians(degrees) * random.standard_normal((len(given), 3))

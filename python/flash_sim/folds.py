@@ -2,6 +2,8 @@
 import dataclasses
 import pathlib
 
+from flash_sim import arguments
+
 SCENES = pathlib.Path(__file__).parent / "scenes"
 
 
@@ -13,12 +15,32 @@ class Carry:
     take: tuple[float, float]
     lay: tuple[float, float]
 
+    def __post_init__(self):
+        if not arguments.text("Carry: hand", self.hand):
+            raise ValueError("Carry: hand: found '', expected a name")
+        for name in ("take", "lay"):
+            place = arguments.numbers(f"Carry: {name}", getattr(self, name), (2,))
+            if not ((0 <= place) & (place <= 1)).all():
+                raise ValueError(f"Carry: {name}: found {tuple(place)}, expected shares from 0 to 1")
+        if tuple(self.take) == tuple(self.lay):
+            raise ValueError(f"Carry: lay: found {tuple(self.lay)}, where it is taken, expected another place")
+
 
 @dataclasses.dataclass(frozen=True)
 class Fold:
     """Stages follow each other; the hands of one stage carry together."""
     scene: str  # of one sheet that lies on the plane z = 0
     stages: tuple[tuple[Carry, ...], ...]
+
+    def __post_init__(self):
+        if not isinstance(self.stages, (tuple, list)) or not self.stages:
+            raise ValueError(f"Fold: stages: found {self.stages!r:.60}, expected one or more tuples of Carry")
+        for number, stage in enumerate(self.stages):
+            if not isinstance(stage, (tuple, list)) or not stage or not all(isinstance(each, Carry) for each in stage):
+                raise ValueError(f"Fold: stages[{number}]: found {stage!r:.60}, expected a tuple of one or more Carry")
+            for what in ("hand", "take"):
+                if len({getattr(carry, what) for carry in stage}) < len(stage):
+                    raise ValueError(f"Fold: stages[{number}]: found one {what} twice, expected each once")
 
     @property
     def hands(self):

@@ -4,6 +4,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from flash_sim import arguments
 from flash_sim.tasks import FoldTask
 
 
@@ -25,7 +26,9 @@ class FoldVectorEnv(VectorEnv):
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
         mask = (options or {}).get("reset_mask")
-        return self.task.reset(None if mask is None else np.flatnonzero(mask), seed=seed), {}
+        if mask is not None:
+            mask = np.flatnonzero(arguments.truths("reset: reset_mask", mask, self.num_envs))
+        return self.task.reset(mask, seed=seed), {}
 
     def step(self, actions):
         observations, rewards, success, time_out = self.task.step(actions)

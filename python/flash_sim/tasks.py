@@ -3,6 +3,7 @@ import dataclasses
 
 import numpy as np
 
+from flash_sim import arguments
 from flash_sim.folds import FOLDS, Fold
 from flash_sim.realtime_sim import RealtimeSim
 
@@ -23,6 +24,15 @@ class FoldSettings:
     turn: float = 0.5             # of the cloth at the start, both ways [rad]
     seed: int = 0
 
+    def __post_init__(self):
+        for name, least in (("steps_per_action", 1), ("time_limit", 1), ("seed", 0)):
+            arguments.whole_number(f"FoldSettings: {name}", getattr(self, name), least)
+        for name, most in (("speed", 100), ("near", 100), ("still", 100), ("shift", 100), ("turn", np.pi)):
+            value = float(arguments.numbers(f"FoldSettings: {name}", getattr(self, name), ()))
+            if not (0 <= value <= most and (value > 0 or name in ("shift", "turn"))):
+                raise ValueError(f"FoldSettings: {name}: found {value:.6g}, expected "
+                                 f"{'0' if name in ('shift', 'turn') else 'above 0'} to {most:.4g}")
+
 
 class FoldTask:
     """A cloth is folded by stages: each hand of a stage is to lay one place of the cloth on another one, and to let go.
@@ -35,13 +45,17 @@ class FoldTask:
     """
 
     def __init__(self, n_envs, settings=None, threads=0):
-        self.settings = settings or FoldSettings()
+        self.settings = FoldSettings() if settings is None else settings
+        if not isinstance(self.settings, FoldSettings):
+            raise TypeError(f"FoldTask: settings: found {settings!r:.60}, expected FoldSettings")
         self.n_envs = n_envs
         self.fold = _fold(self.settings.fold)
         self.sim = RealtimeSim(threads=threads, seed=self.settings.seed)
         self.sim.load_config(self.fold.scene)
         self.sim.set_envs(n_envs)
         self.sim.initialize()
+        if len(self.sim.bodies) != 1:
+            raise ValueError(f"fold: {self.fold.scene}: found {len(self.sim.bodies)} objects, expected one sheet")
         self.hands, self.stages = self.fold.hands, len(self.fold.stages)
         self._x, self._v = self.sim.positions(), self.sim.velocities()
         self._flat = np.array(self._x[0])
@@ -94,8 +108,8 @@ class FoldTask:
     def reset(self, env_ids=None, seed=None):
         """New episodes: the cloth lies flat, shifted and turned at random. Returns the observations of all."""
         if seed is not None:
-            self._random = np.random.default_rng(seed)
-        ids = np.arange(self.n_envs) if env_ids is None else np.asarray(env_ids, int)
+            self._random = np.random.default_rng(arguments.whole_number("reset: seed", seed, 0, 2**63 - 1))
+        ids = arguments.environments("reset: env_ids", env_ids, self.n_envs)
         if len(ids):
             self.sim.reset(ids, positions=np.stack([self._placed() for _ in ids]))
             self.sim.randomize(self.settings.randomization, seed=int(self._random.integers(2**31)), env_ids=ids)
@@ -117,9 +131,7 @@ class FoldTask:
         it is to lie [m], over all hands that work, and 10 for a stage that is done. An environment that is lost ends as one
         whose time is up.
         """
-        actions = np.clip(np.asarray(actions, np.float64), -1, 1)
-        if actions.shape != (self.n_envs, self.actions) or not np.isfinite(actions).all():
-            raise ValueError(f"actions: found the shape {actions.shape}, expected finite ({self.n_envs}, {self.actions})")
+        actions = np.clip(arguments.numbers("step: actions", actions, (self.n_envs, self.actions)), -1, 1)
         by_hand = actions.reshape(self.n_envs, -1, 4)
         self.closed = by_hand[:, :, 3] > 0
         way = by_hand[:, :, :3] * self.settings.speed * self.sim.time_step
@@ -175,7 +187,7 @@ class FoldTask:
 def _fold(fold):
     if isinstance(fold, Fold):
         return fold
-    if fold not in FOLDS:
+    if not isinstance(fold, str) or fold not in FOLDS:
         raise ValueError(f"fold: found {fold!r}, expected one of {', '.join(FOLDS)}, or a Fold")
     return FOLDS[fold]
 
@@ -195,6 +207,8 @@ class FoldTeacher:
     put = 0.02          # from where it is to lie, where a hand opens [m]
 
     def __init__(self, task):
+        if not isinstance(task, FoldTask):
+            raise TypeError(f"FoldTeacher: task: found {task!r:.60}, expected a FoldTask")
         shape = task.n_envs, len(task.hands)
         self.state = np.full(shape, APPROACH)
         self.stage = np.array(task.stage)

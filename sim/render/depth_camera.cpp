@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "data/files/error.h"
+#include "data/files/text.h"
 #include "data/machine/parallel.h"
 
 namespace flash::sim {
@@ -17,12 +18,16 @@ Pinhole pinhole(const data::CameraIntrinsics& camera) {
   if (camera.width < 1 || camera.height < 1)
     throw data::InputError("camera: found a picture of " + std::to_string(camera.width) + " x " +
                            std::to_string(camera.height) + " pixels, expected 1 x 1 or more");
-  if (!(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy)))
-    throw data::InputError("camera: found the focal lengths " + std::to_string(camera.fx) + " and " +
-                           std::to_string(camera.fy) + " px, expected finite ones above 0");
-  if (!std::isfinite(camera.cx) || !std::isfinite(camera.cy))
-    throw data::InputError("camera: found the centre " + std::to_string(camera.cx) + ", " +
-                           std::to_string(camera.cy) + " px, expected finite numbers");
+  constexpr double least_focal_length = 1e-3, largest = 1e9;  // rays and their lengths stay finite [px]
+  for (const double focal_length : {camera.fx, camera.fy})
+    if (!(focal_length >= least_focal_length && focal_length <= largest))
+      throw data::InputError("camera: found a focal length of " + data::format_short(focal_length) +
+                             " px, expected " + data::format_short(least_focal_length) + " to " +
+                             data::format_short(largest));
+  for (const double centre : {camera.cx, camera.cy})
+    if (!(std::abs(centre) <= largest))
+      throw data::InputError("camera: found the centre at " + data::format_short(centre) +
+                             " px, expected at most " + data::format_short(largest));
   for (const double coefficient : camera.distortion)
     if (coefficient != 0)
       throw data::InputError(

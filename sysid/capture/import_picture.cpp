@@ -12,7 +12,7 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kPanel = 460, kMargin = 24, kLegend = 170;  // [px]
+constexpr double kPanel = 460, kMargin = 24, kLegend = 200;  // [px]
 constexpr std::size_t kFrames = 7, kPoints = 250;            // drawn, and of each
 
 template <class... Arguments>

@@ -60,6 +60,31 @@ def test_unknown_folds_are_refused():
         FoldTask(1, FoldSettings("sock"))
 
 
+def test_masks_choose_what_is_reset():
+    task = FoldTask(2, FoldSettings(**SHORT))
+    task.step(np.zeros((2, 4)))
+    task.reset(np.array([True, False]))
+    assert task.lengths.tolist() == [0, 1]
+    for wrong in ([True], [0.7], "a", [2], [0, 0]):
+        with pytest.raises((TypeError, ValueError), match="reset: env_ids: found"):
+            task.reset(wrong)
+
+
+def test_folds_that_are_none_are_refused():
+    carry, other = folds.Carry("a", (0, 1), (1, 0)), folds.Carry("b", (1, 1), (0, 0))
+    for make in (lambda: folds.Carry("a", (-5, 0), (1, 1)), lambda: folds.Carry("a", (0, float("nan")), (1, 1)),
+                 lambda: folds.Carry("a", (0, 1), (0, 1)), lambda: folds.Carry(3, (0, 1), (1, 1)),
+                 lambda: folds.Carry("a", (0, 1, 0), (1, 1)), lambda: folds.Fold("s", ()), lambda: folds.Fold("s", ((),)),
+                 lambda: folds.Fold("s", (carry,)), lambda: folds.Fold("s", ((carry, folds.Carry("a", (1, 1), (0, 0))),)),
+                 lambda: folds.Fold("s", ((carry, folds.Carry("b", (0, 1), (0, 0))),)),
+                 lambda: FoldSettings(steps_per_action=-1), lambda: FoldSettings(speed=-1), lambda: FoldSettings(near=float("nan")),
+                 lambda: FoldSettings(shift=1e6), lambda: FoldSettings(time_limit=0), lambda: FoldTask(2, "towel"),
+                 lambda: FoldTeacher(None)):
+        with pytest.raises((TypeError, ValueError), match="(Carry|Fold|FoldSettings|FoldTask|FoldTeacher): .*found"):
+            make()
+    assert folds.Fold("s", ((carry, other),)).hands == ["a", "b"]
+
+
 def test_what_drops_the_corner_takes_it_again():
     task = FoldTask(2, FoldSettings(seed=1))
     teacher = FoldTeacher(task)

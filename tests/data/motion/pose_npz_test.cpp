@@ -67,6 +67,11 @@ TEST(PairsOfNumpy, ThatAreNoneAreToldWhatWasFoundAndExpected) {
   const std::vector<double> one(kMatrices.begin(), kMatrices.begin() + 16);
   const std::string fewer = said({{"robot", {2, 4, 4}, kMatrices}, {"target", {1, 4, 4}, one}});
   EXPECT_NE(fewer.find("found robot 2 x 4 x 4, target 1 x 4 x 4"), std::string::npos) << fewer;
+  EXPECT_NE(said({{"robot", {2, 4, 4}, kMatrices},
+                  {"ROBOT", {2, 4, 4}, kMatrices},
+                  {"target", {2, 4, 4}, kMatrices}})
+                .find("found another array of this name but for capitals and signs"),
+            std::string::npos);
   std::vector<double> skewed = kMatrices;
   skewed[16] = 0.9;
   EXPECT_NE(said({{"robot", {2, 4, 4}, skewed}, {"target", {2, 4, 4}, kMatrices}}).find("pair 1"),

@@ -264,11 +264,15 @@ TEST(DepthCameras, WhatLiesOnAPlaneThatYieldsShows) {
 TEST(DepthCameras, RefuseWhatIsNoCamera) {
   const Isometry3d pose = Isometry3d::Identity();
   data::CameraIntrinsics camera = small_camera();
-  camera.fx = 0;
-  EXPECT_THROW(see(camera, pose, {}), data::InputError);
+  for (const double focal_length : {0.0, 1e-300, 1e300, std::nan("")}) {
+    camera.fx = focal_length;
+    EXPECT_THROW(see(camera, pose, {}), data::InputError);
+  }
   camera = small_camera();
-  camera.cy = std::nan("");
-  EXPECT_THROW(see(camera, pose, {}), data::InputError);
+  for (const double centre : {1e300, std::nan("")}) {
+    camera.cy = centre;
+    EXPECT_THROW(see(camera, pose, {}), data::InputError);
+  }
   camera = small_camera();
   camera.height = 0;
   EXPECT_THROW(see(camera, pose, {}), data::InputError);
