@@ -159,6 +159,9 @@ int run_twin(const SynthOptions& options) {
   settings.solver.stop = &stop_on_signals();
   settings.mesh = options.mesh;
   settings.element_order = asset.element_order;
+  if (options.common.device.starts_with("cuda"))
+    throw data::InputError("--device " + options.common.device +
+                           ": --like is simulated on the CPU alone; use --device cpu or auto");
   const sysid::Replay replay = sysid::make_replay(recording, settings);
   std::vector<std::string> notices;
   const std::vector<sysid::Axis> axes = parse_values(options.holds);
@@ -200,6 +203,7 @@ int run_twin(const SynthOptions& options) {
 int run_synth(SynthOptions options) {
   stop_on_signals();
   if (!options.like.empty()) return run_twin(options);
+  options.synth.device = sim::choose_device(options.common.device == "auto" ? "cpu" : options.common.device);
   const data::Asset asset = data::load_asset(options.asset);
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
   const data::TriangleMesh mesh = options.mesh.empty()            ? data::load_rest_mesh(asset)
@@ -327,7 +331,9 @@ void add_synth_verb(CLI::App& app, Action& action) {
                    "File for the truth; without it, truth.json in the recording");
   verb->add_option("-o,--out", options->out, "Folder of the recording")->required();
   add_seed_option(*verb, options->common);
-  add_cpu_option(*verb, options->common);
+  verb->add_option("--device", options->common.device,
+                   "Where the simulation runs: cpu, cuda or cuda:1, by number; auto: the CPU")
+      ->capture_default_str();
   add_common_options(*verb, options->common);
   verb->footer(
       "Example:\n"

@@ -285,6 +285,8 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   replay.settings.clamp_slopes = settings.clamp_slopes;
   replay.settings.self_contact = settings.self_contact;
   replay.settings.grasp_cell = settings.grasp_cell;
+  replay.settings.device = settings.device.device;
+  replay.settings.cuda_devices = settings.device.cuda_devices;
   grade_towards_grasps(replay.settings, replay.recording);
   replay.surface = replay.recording.mesh;
   sim::Sheet sheet = sim::make_sheet(replay.surface);
@@ -295,8 +297,11 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   for (const data::RecordedKeyframe& keyframe : synthetic.recording.keyframes)
     replay.observations.push_back({.t = keyframe.time + settings.time_offset});
   check_job({replay}, 1, estimate_batch({replay}, 1));
+  const std::vector<ReplayCandidate> truth = {{material, settings.nuisance}};
+  if (replay.settings.device == sim::Device::cuda)
+    if (const std::string why = why_not_on_device(replay, truth); !why.empty()) throw data::InputError(why);
   Motion motion;
-  run(replay, {{material, settings.nuisance}}, scored_steps(replay), [&](std::size_t, ReplayResult result) {
+  run(replay, truth, scored_steps(replay), [&](std::size_t, ReplayResult result) {
     synthetic.residual_max = result.residual_max;
     synthetic.unconverged_share = result.unconverged_share;
     motion = std::move(result.motion);

@@ -9,6 +9,7 @@
 #include "data/camera/depth_image.h"
 #include "data/mesh/mesh.h"
 #include "data/recording/recording.h"
+#include "sim/device.h"
 #include "sim/newton/solver.h"
 #include "sim/scene/environment.h"
 #include "sysid/replay/replay.h"
@@ -43,6 +44,7 @@ struct SynthSettings {
   std::optional<sim::SelfContact> self_contact{};  ///< as in ReplaySettings
   bool forces = false;                             ///< record the gripper's force on the sheet
   bool raw = false;                                ///< keep what the cameras see, table and gripper included
+  sim::DeviceChoice device{};                      ///< where it is simulated
   unsigned seed = 1;
 };
 
@@ -60,7 +62,8 @@ struct SynthRecording {
 /// Simulates a sheet that lies on a table (z = 0) while grippers move patches of it from rest to rest along
 /// s(tau) = tau^3 (10 - 15 tau + 6 tau^2), tau = t / duration, and observes it with depth cameras: the
 /// visible side only, hidden by itself and by the grippers. `mesh_spec` is the specification or file `mesh`
-/// came from. Throws data::InputError on an unknown kind, no camera, or settings out of range.
+/// came from. Throws data::InputError on an unknown kind, no camera, settings out of range, or a CUDA device
+/// that cannot simulate them.
 SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mesh_spec,
                           const data::SheetMaterial& material, const SynthSettings& settings,
                           const sim::SolverSettings& solver);

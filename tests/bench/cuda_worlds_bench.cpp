@@ -1,5 +1,6 @@
 // Worlds on a device: the lifts of `flash-sim bench` in one call, step by step, with poses given at each
-// step, with unlike Poisson's ratios and times at which the gripper closes, and resets of some of them.
+// step, with unlike Poisson's ratios and times at which the gripper closes, and resets of some of them; and
+// how much more work the slowest environment of a step takes than the mean, for which a step waits.
 // Usage: flash_cuda_worlds_bench [VERTICES [ENVIRONMENTS[,...] [STEPS [THREADS]]]]. Milliseconds a step of
 // all environments. Each line is timed twice, the better time is told.
 #include <algorithm>
@@ -94,6 +95,24 @@ struct Bench {
     std::fflush(stdout);
   }
 
+  /// Work as devices count it, summed over the steps from the start.
+  void print_slowest(Worlds& worlds) const {
+    double slowest = 0, mean = 0;
+    for (int k = 0; k < steps; ++k) {
+      worlds.step();
+      double most = 0;
+      for (int e = 0; e < worlds.size(); ++e) {
+        const StepReport& report = worlds.report(e);
+        const double work = report.solves + 2 * report.iterations + 8 * report.factorizations;
+        most = std::max(most, work);
+        mean += work / worlds.size();
+      }
+      slowest += most;
+    }
+    std::printf("%6d slowest environment of a step %24.2f times the mean work\n", environments,
+                slowest / mean);
+  }
+
   void give_poses(Worlds& to, int k) const {
     const Eigen::Matrix<double, 7, 1> pose = data::to_vector(pose_at_step(k));
     std::vector<double> numbers;
@@ -115,6 +134,8 @@ struct Bench {
         alike.step();
       }
     });
+    alike.reset({});
+    print_slowest(alike);
     alike.positions();  // from now on there are views
     const std::vector<int> ten = [&] {
       std::vector<int> numbers(static_cast<std::size_t>(std::min(10, environments)));

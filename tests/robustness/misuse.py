@@ -242,16 +242,17 @@ def check_values(options, folder):
 
 def check_device(options, folder):
     """--device cuda of verbs that no device does, and without one of those that it does."""
-    for words in ([options.sysid, "synth", "--asset", "cloth.json", "--kind", "hang"],
-                  [options.sysid, "plan", "recording", "--asset", "asset.json"]):
-        for device in ("cuda", "cuda:0", "gpu"):
-            yield from refused(options, folder, [*words, "-o", "out", "--device", device], f'--device: found "{device}"',
-                               "auto or cpu", "on the CPU alone")
+    for device in ("cuda", "cuda:0", "gpu"):
+        yield from refused(options, folder, [options.sysid, "plan", "recording", "--asset", "asset.json", "-o", "out", "--device", device],
+                           f'--device: found "{device}"', "auto or cpu", "on the CPU alone")
     # Without a device, whatever the machine has.
     hidden = dict(os.environ, CUDA_VISIBLE_DEVICES="")
     for words in (["bench"], ["run", "short.json", "-o", "out"]):
         yield from refused(options, folder, [options.sim, *words, "--device", "cuda"], "--device cuda", "CUDA",
                            "use --device cpu or auto", env=hidden)
+    synth = [options.sysid, "synth", "--asset", "cloth.json", "--kind", "hang", "-o", "out", "--device"]
+    yield from refused(options, folder, [*synth, "cuda"], "--device cuda", "CUDA", "use --device cpu or auto", env=hidden)
+    yield from refused(options, folder, [*synth, "gpu"], "--device", "gpu")
 
 
 def check_names(options, folder):
@@ -294,9 +295,8 @@ def check_help(options, folder):
         text = program.must(*words, "--help").stdout
         for option, value in values.items():
             yield re.search(f"{option} {value}(,| |$)", text, re.MULTILINE), f"{words[1]} --help: not {option} {value}"
-    for words in ([options.sysid, "synth"], [options.sysid, "plan"]):
-        text = program.must(*words, "--help").stdout
-        yield "--device DEVICE:{auto,cpu}=auto" in text and "cuda" not in text, f"{words[1]} --help: {text}"
+    text = program.must(options.sysid, "plan", "--help").stdout
+    yield "--device DEVICE:{auto,cpu}=auto" in text and "cuda" not in text, f"plan --help: {text}"
 
 
 def check_places(options, folder):

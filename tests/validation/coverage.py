@@ -328,13 +328,14 @@ def main():
                                                   "as they are of points alone")
     parser.add_argument("--jobs", type=int, default=2, help="searches at a time; the same command again goes on where it stopped")
     parser.add_argument("--threads", type=int, help="of each search; without it, as many as there are processors")
+    parser.add_argument("--truth-device", help="where recordings are made, as synth --device has it; without it, the processor")
     parser.add_argument("--minutes", type=float, help="after which no search is begun: the tables are of what was done by then")
     parser.add_argument("--rows", nargs="+", type=pathlib.Path, default=[], metavar="FILE",
                         help="coverage.json of earlier calls of the kind: the tables are of their twins, too; with --runs 0, of them alone")
     options = parser.parse_args()
     kind = KINDS[options.kind]
     earlier, bounds = read_rows(options.rows)
-    runs = kept.Runs(options.sysid, options.out, options.threads)
+    runs = kept.Runs(options.sysid, options.out, options.threads, options.truth_device)
     asset = synthetic.write_asset(options.out, **kind.properties)
     seeds = range(options.seed, options.seed + options.runs)
     jobs = [(seed, None) for seed in seeds] + [(seed, kind.wrong[i % len(kind.wrong)]) for i, seed in enumerate(seeds)]
@@ -342,7 +343,7 @@ def main():
     jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair if job not in known]
     begin = time.monotonic()
     first = 0 if kind.rates else min(1, len(jobs))  # sheets of one size share motions: the first search fills the store
-    found = [searched(kept.Runs(options.sysid, options.out), asset, kind, *job) for job in jobs[:first]]
+    found = [searched(kept.Runs(options.sysid, options.out, None, options.truth_device), asset, kind, *job) for job in jobs[:first]]
 
     def done(job):
         twin = searched(runs, asset, kind, *job)

@@ -1,21 +1,26 @@
 """Runs of flash-sysid that are kept and not repeated."""
 import concurrent.futures
+import contextlib
 import csv
 import json
 import math
 import pathlib
 import subprocess
 import sys
+import threading
 import time
 
 
 class Runs:
     """Each run has a folder below `out`; one that holds the answer to the same command is left alone."""
 
-    def __init__(self, sysid, out, threads=None):
+    def __init__(self, sysid, out, threads=None, synth_device=None):
+        """`synth_device`: where recordings are made, as synth --device has it; of a CUDA device one at a time."""
         self.sysid = str(sysid)
         self.out = pathlib.Path(out)
         self.threads = [] if threads is None else ["--threads", str(threads)]
+        self.synth_device = [] if synth_device is None else ["--device", synth_device]
+        self.synth_turn = threading.Lock() if synth_device is not None else contextlib.nullcontext()
 
     def grid(self, name, recordings, *options, horizon=False):
         """The summary of a search, with the rows of results.csv as `rows`. Exit code 3 (finished, but nothing is
@@ -56,7 +61,8 @@ class Runs:
         folder = self.out / name
         command = ["synth", "--asset", asset, *options, "--quiet", "-o", str(folder)]
         if not self._done(folder, command, "recording.json"):
-            self._call(folder, command, ["--force"])
+            with self.synth_turn:
+                self._call(folder, command, [*self.synth_device, "--force"])
         return folder
 
     def import_clouds(self, name, clouds, *options):
