@@ -75,6 +75,7 @@ KINDS = {
                      {"young": (20, 200, 5), "poisson": (0.05, 0.45, 5)}, ("damping", "weight", "depth", "clock", "diagonals"),
                      ("--hold", "friction=0.3:measured")),
 }
+ALSO = {"sampled": ("--sampled",)}  # other ways to an answer from the same motions, with their options
 TRUTH_STEP = "0.0025"  # of time: a quarter of that of the searches, as cloth takes none [s]
 NORMAL = 1.96  # half width of 95 % over the standard deviation
 WEIGHT, SCALES = 0.2, 0.004  # areal density as weighed and its standard deviation [kg/m^2]
@@ -170,18 +171,28 @@ def recorded(runs, asset, kind, seed, wrong):
     return recording
 
 
-def run_name(seed, wrong):
-    return f"run_{seed}_{wrong or 'right'}"
+def run_name(seed, wrong, way=None):
+    return f"run_{seed}_{wrong or 'right'}" + ("" if way is None else f"_{way}")
 
 
-def searched(runs, asset, kind, seed, wrong=None):
+def is_finished(out, job, ways=()):
+    return all((out / run_name(*job, way) / "summary.json").exists() for way in (None, *ways))
+
+
+def searched(runs, asset, kind, seed, wrong=None, ways=()):
+    """What a search says, and what it says by each of `ways` from the same motions."""
     recording = recorded(runs, asset, kind, seed, wrong)
     weighed = () if wrong == "weight" else ("--hold", f"areal_density={WEIGHT}+-{SCALES}:measured")
-    summary = runs.grid(run_name(seed, wrong), [recording], "--asset", asset, "--mesh", meshes_of(kind, seed)[1], *kind.searched_with,
-                        *axes(kind), *kind.held, *weighed, "--no-plan", "--rollouts", str(runs.out / "motions"))
-    return {"seed": seed, "wrong": wrong, "truth": truth_of(kind, seed), "parameters": summary["parameters"],
-            "noise": summary["recordings"][0]["noise_m"],
-            "told": any(not r["model_fits"] for r in summary["recordings"]), "recording": recording}
+
+    def answer(way):
+        more = () if way is None else ALSO[way]
+        summary = runs.grid(run_name(seed, wrong, way), [recording], "--asset", asset, "--mesh", meshes_of(kind, seed)[1],
+                            *kind.searched_with, *axes(kind), *kind.held, *weighed, "--no-plan", "--rollouts", str(runs.out / "motions"), *more)
+        return {"parameters": summary["parameters"], "noise": summary["recordings"][0]["noise_m"],
+                "told": any(not r["model_fits"] for r in summary["recordings"]), "seconds": summary["wall_seconds"]}
+
+    return {"seed": seed, "wrong": wrong, "truth": truth_of(kind, seed), "recording": recording} | answer(None) | {
+        "also": {way: answer(way) for way in ways}}
 
 
 def meshes(runs, kind, twin, name, parameters):
@@ -291,6 +302,28 @@ def print_right(kind, twins, bounds):
               f"{median(ratios):14.2f} {f'{claims} of {len(bounded)}':>22}")
 
 
+def answered(twins, way):
+    """The twins that were answered by `way` too, as that answers them."""
+    return [twin | twin["also"][way] for twin in twins if way in twin.get("also", {})]
+
+
+def print_each(kind, twins, way):
+    """Each answer beside that of another way."""
+    print(f"\nEach twin: the default | {way}\n")
+    print(f"{'seed':>8} {'':10} {'':12} {'truth':>10} {'truth inside':>13} {'width':>17} {'score':>17} {'told':>9} {'seconds':>13}")
+    for twin in sorted(twins, key=lambda twin: (twin["seed"], twin["wrong"] or "")):
+        pair = (twin, *answered([twin], way))
+        for name in kind.ranges:
+            truth, ends = twin["truth"][name], [[coordinate(name, end) for end in each["parameters"][name]["interval95"]] for each in pair]
+            inside = " | ".join("yes" if low <= coordinate(name, truth) <= high else "no" for low, high in ends)
+            widths = " | ".join(f"{high - low:.4f}" for low, high in ends)
+            scores = " | ".join(f"{interval_score(name, each['parameters'][name], truth):.4f}" for each in pair)
+            told = " | ".join("yes" if each["told"] else "no" for each in pair)
+            seconds = " | ".join(f"{each.get('seconds', math.nan):.0f}" for each in pair)
+            print(f"{twin['seed']:8} {twin['wrong'] or 'right':10} {name:12} {truth:10.4g} {inside:>13} {widths:>17} {scores:>17} {told:>9} "
+                  f"{seconds:>13}")
+
+
 def print_wrong(kind, twins):
     print("\nThe model is wrong: a claim holds, or the answer says that the model does not fit\n")
     print(f"{'':12} {'twins':>6} {'told':>6} " + " ".join(f"{name + ' held or told':>24}" for name in kind.ranges))
@@ -303,6 +336,11 @@ def print_wrong(kind, twins):
             cells.append(f"{sum(claimed)} of {len(claimed)} claims")
         print(f"{wrong or 'all':12} {len(of_kind):6} {sum(twin['told'] for twin in of_kind):6} " +
               " ".join(f"{cell:>24}" for cell in cells))
+
+
+def print_both(kind, twins, bounds):
+    print_right(kind, [twin for twin in twins if not twin["wrong"]], bounds)
+    print_wrong(kind, [twin for twin in twins if twin["wrong"]])
 
 
 def read_rows(paths):
@@ -332,46 +370,70 @@ def main():
     parser.add_argument("--minutes", type=float, help="after which no search is begun: the tables are of what was done by then")
     parser.add_argument("--rows", nargs="+", type=pathlib.Path, default=[], metavar="FILE",
                         help="coverage.json of earlier calls of the kind: the tables are of their twins, too; with --runs 0, of them alone")
+    parser.add_argument("--also", nargs="+", choices=ALSO, default=[], metavar="WAY",
+                        help="answer each twin again from the same motions, as sampled: by importance sampling. Tables of each way are "
+                             "of the twins that have both answers, and a line of each")
     options = parser.parse_args()
     kind = KINDS[options.kind]
+    ways = list(dict.fromkeys(options.also))
     earlier, bounds = read_rows(options.rows)
     runs = kept.Runs(options.sysid, options.out, options.threads, options.truth_device)
     asset = synthetic.write_asset(options.out, **kind.properties)
     seeds = range(options.seed, options.seed + options.runs)
     jobs = [(seed, None) for seed in seeds] + [(seed, kind.wrong[i % len(kind.wrong)]) for i, seed in enumerate(seeds)]
-    known = [(twin["seed"], twin["wrong"]) for twin in earlier]
+    known = [(twin["seed"], twin["wrong"]) for twin in earlier if all(way in twin.get("also", {}) for way in ways)]
     jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair if job not in known]
     begin = time.monotonic()
     first = 0 if kind.rates else min(1, len(jobs))  # sheets of one size share motions: the first search fills the store
-    found = [searched(kept.Runs(options.sysid, options.out, None, options.truth_device), asset, kind, *job) for job in jobs[:first]]
+    found = [searched(kept.Runs(options.sysid, options.out, None, options.truth_device), asset, kind, *job, ways)
+             for job in jobs[:first]]
 
     def done(job):
-        twin = searched(runs, asset, kind, *job)
+        return with_bound(searched(runs, asset, kind, *job, ways))
+
+    def with_bound(twin):
         bound = least_spread(runs, kind, twin) if not twin["wrong"] and twin["seed"] in bounded else None
         return twin, bound
 
     bounded = seeds[:options.bounds if kind.bound_with is not None else 0]
     left = None if options.minutes is None else options.minutes - (time.monotonic() - begin) / 60
     # What an earlier call finished counts however little time there is.
-    finished = [job for job in jobs[first:] if (options.out / run_name(*job) / "summary.json").exists()]
+    finished = [job for job in jobs[first:] if is_finished(options.out, job, ways)]
     others = [job for job in jobs[first:] if job not in finished]
-    for part, minutes in ((finished, None), (others, left)):
-        for _, (twin, bound) in kept.each_in_time(done, part, options.jobs, minutes):
+
+    def take(task, part, minutes):
+        for _, (twin, bound) in kept.each_in_time(task, part, options.jobs, minutes):
             found.append(twin)
             if bound is not None:
                 bounds[twin["seed"]] = bound
+
+    take(done, finished, None)
+    take(done, others, left)
+    if ways:  # of what was answered in one way alone, that counts
+        taken = [(twin["seed"], twin["wrong"]) for twin in found]
+        one_way = [job for job in others if job not in taken and is_finished(options.out, job)]
+        take(lambda job: with_bound(searched(runs, asset, kind, *job)), one_way, None)
     if first and found[0]["seed"] in bounded:
         bounds[found[0]["seed"]] = least_spread(runs, kind, found[0])
-    found += earlier
+    taken = [(twin["seed"], twin["wrong"]) for twin in found]
+    found += [twin for twin in earlier if (twin["seed"], twin["wrong"]) not in taken]
     rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
             for twin in sorted(found, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]
     (options.out / "coverage.json").write_text(json.dumps(rows, indent=1))
     if not rows:
         print(f"\n{options.kind}: none of {len(jobs)} was searched in time")
         return 1
-    print(f"\n{options.kind}, seeds {rows[0]['seed']} to {rows[-1]['seed']}, {len(rows)} of {len(jobs) + len(earlier)} searched")
-    print_right(kind, [twin for twin in found if not twin["wrong"]], bounds)
-    print_wrong(kind, [twin for twin in found if twin["wrong"]])
+    print(f"\n{options.kind}, seeds {rows[0]['seed']} to {rows[-1]['seed']}, {len(rows)} of "
+          f"{len({*jobs, *((twin['seed'], twin['wrong']) for twin in earlier)})} searched")
+    print_both(kind, found, bounds)
+    for way in ways:
+        both = [twin for twin in found if way in twin.get("also", {})]
+        if len(both) < len(found):
+            print(f"\nThe default, of the {len(both)} that were answered in both ways")
+            print_both(kind, both, bounds)
+        print(f"\nAnswered again: {way}, {len(both)} of {len(found)}")
+        print_both(kind, answered(both, way), bounds)
+        print_each(kind, both, way)
     return 0
 
 
