@@ -36,7 +36,7 @@ struct RunOptions {
   std::optional<double> duration;  // [s]
   int environments = 1;
   std::string vary;
-  bool contacts = false, quiet = false, verbose = false, json = false, force = false;
+  bool no_self_contact = false, contacts = false, quiet = false, verbose = false, json = false, force = false;
 };
 
 /// A line on stderr about what is being done, where that takes longer than two seconds.
@@ -158,7 +158,8 @@ int run(const RunOptions& options) {
   if (settings.device.device == sim::Device::cuda && options.contacts)
     throw data::InputError("--contacts: forces of each contact are told on the CPU alone; use --device cpu");
   begin("reading " + options.scene);
-  const data::Scene scene = data::load_scene(options.scene);
+  data::Scene scene = data::load_scene(options.scene);
+  if (options.no_self_contact) scene.self_contact.reset();
   ProgressLine progress(!options.quiet);
   settings.steps = steps_to_run(options, scene);
   settings.contacts = options.contacts;
@@ -269,6 +270,8 @@ void add_run_verb(CLI::App& app, Action& action) {
   verb.add_option("--duration", options->duration, "In place of the scene's [s]")
       ->check(number_from(0))
       ->excludes("--steps");
+  verb.add_flag("--no-self-contact", options->no_self_contact,
+                "Objects pass through themselves and each other, whatever the scene says");
   verb.add_flag(
       "--contacts", options->contacts,
       "Write contacts/, the force of each contact, and resultants.csv, of each body, at each frame");

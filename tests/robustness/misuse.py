@@ -255,6 +255,20 @@ def check_device(options, folder):
     yield from refused(options, folder, [*synth, "gpu"], "--device", "gpu")
 
 
+def check_layers(options, folder):
+    """--no-self-contact takes the layers of a scene away, and nothing else: its log is that of the scene without them."""
+    layers = folder / "layers.json"
+    layers.write_text(json.dumps(scene("cloth.json") | {"self_contact": {"thickness": 0.001, "friction": 0.3}}))
+    logs = {}
+    for name, *words in (("with", layers), ("without", layers, "--no-self-contact"), ("none", folder / "short.json")):
+        program.must(options.sim, "run", *words, "-o", folder / name)
+        logs[name] = (folder / name / "log.csv").read_text()
+        shutil.rmtree(folder / name)
+    yield "layer_touches" in logs["with"], "a scene with self_contact: no layers in log.csv"
+    yield logs["without"] == logs["none"], "run --no-self-contact: not as the scene without self_contact"
+    layers.unlink()
+
+
 def check_names(options, folder):
     """Names of thousands of letters are said, but not in full."""
     name = "x" * 5000
@@ -470,7 +484,7 @@ def main():
     parser.add_argument("--calib", type=pathlib.Path, help="the program flash-calib")
     parser.add_argument("--only", default="", help="checks whose name has this")
     options = parser.parse_args()
-    checks = [check_config, check_words, check_units, check_unusable, check_values, check_device, check_names, check_help, check_places, check_calibration, check_guess,
+    checks = [check_config, check_words, check_units, check_unusable, check_values, check_device, check_layers, check_names, check_help, check_places, check_calibration, check_guess,
               check_kills, check_digits, check_set_up, check_early_signals]
     done, failed = 0, 0
     with tempfile.TemporaryDirectory() as temporary:
