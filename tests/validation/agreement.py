@@ -26,7 +26,7 @@ def material(seed):
 
 
 def recorded(runs, asset, name, seed, words, parameters):
-    draw = random.Random(-seed)
+    draw = coverage.draws(seed, "errors")
     offset = ",".join(f"{draw.gauss(0, 0.003):.5f}" for _ in range(3))
     fresh = not (runs.out / name / "recording.json").exists()
     recording = runs.synth(name, asset, "--mesh", LIFT.truth, *words, "--time-step", coverage.TRUTH_STEP, "--seed", str(seed),

@@ -91,6 +91,11 @@ def coordinate(name, value):
     return math.log(value) if is_logarithmic(name) else value
 
 
+def draws(seed, what):
+    """Of one stream for each seed and each purpose: a truth says nothing of the errors of its recording."""
+    return random.Random(f"{what} {seed}")
+
+
 def truth_of(kind, seed):
     """Even over the searched range."""
     draw = random.Random(seed)
@@ -131,21 +136,21 @@ def spoil_clock(recording, seed):
 
 def meshes_of(kind, seed):
     """Of the truth and of the search."""
-    side = round(random.Random(seed + 1).uniform(*kind.sides), 3)
+    side = round(draws(seed, "size").uniform(*kind.sides), 3)
     fold = (truth_of(kind, seed).get("bending", math.inf) / (WEIGHT * 9.81)) ** (1 / 3)  # Peirce (1930) [m]
     return tuple(mesh.format(side=side, cell=round(min(side / 60, fold / 7), 5)) for mesh in (kind.truth, kind.searched))
 
 
 def recorded(runs, asset, kind, seed, wrong):
     """A recording of cloth of the seed's material; `wrong`: what the model is not told of."""
-    draw = random.Random(-seed)
+    draw = draws(seed, "errors")
     name = f"recording_{seed}_{wrong or 'right'}"
     fresh = not (runs.out / name / "recording.json").exists()
     words = kind.motion
     fixed = dict(truth_of(kind, seed))
     mesh, searched_mesh = meshes_of(kind, seed)
     if kind.rates:
-        words = moved(words, rate=f"{random.Random(seed + 2).uniform(*kind.rates):.2f}")
+        words = moved(words, rate=f"{draws(seed, 'rate').uniform(*kind.rates):.2f}")
     if wrong == "damping":
         fixed["air_drag"] = 2.0
     if wrong == "grasp":  # larger by what nobody sees
