@@ -390,7 +390,11 @@ void LiveScene::step(int count) {
       stop_motion(s.worlds);
     }
   } else {
-    sim::step(s.worlds, s.threads, count);
+    // A device is given what moves in all steps of a call.
+    constexpr int most_on_device = 100;
+    const int part = s.copies ? std::min(count, most_on_device) : count;
+    for (int taken = 0; taken < count; taken += part)
+      sim::step(s.worlds, s.threads, std::min(part, count - taken));
   }
   s.interrupted = false;
   s.show();
