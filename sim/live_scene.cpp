@@ -207,8 +207,8 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, co
     s.forces.add(surfaces[static_cast<std::size_t>(k)],
                  std::vector(s.worlds.size(), EndEffectorNumbers{.frame = -1, .hold = -1, .obstacle = k}),
                  environments);
-  if (const Tensor first = s.worlds.front().status(); first.device == Device::cuda)
-    s.copies = std::make_unique<DeviceCopies>(first.device_number);
+  if (device.device == Device::cuda)
+    s.copies = std::make_unique<DeviceCopies>(device.cuda_devices.empty() ? 0 : device.cuda_devices.front());
   s.show();
 }
 

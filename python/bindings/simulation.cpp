@@ -97,15 +97,19 @@ void Simulation::close() {
   use([&](sim::LiveScene&) { live_.reset(); });
 }
 
-double Simulation::time_steps(int count) {
+double Simulation::time_steps(const std::string& end_effector, const sim::Tensor& poses) {
   return use([&](sim::LiveScene& live) {
     const nb::gil_scoped_release release;
+    const auto steps = [&] {
+      sim::Tensor of_step{.data = poses.data, .shape = {live.size(), 7}};
+      for (std::int64_t k = 0; k < poses.shape[0]; ++k) {
+        live.move_end_effector(end_effector, {}, of_step);
+        live.step();
+        of_step.data = static_cast<const double*>(of_step.data) + 7 * live.size();
+      }
+    };
     const auto start = std::chrono::steady_clock::now();
-    worker_
-        .start([&] {
-          for (int k = 0; k < count; ++k) live.step();
-        })
-        .get();
+    worker_.start(steps).get();
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   });
 }
@@ -141,7 +145,9 @@ void bind_simulation(nb::module_& module) {
   nb::class_<Simulation> simulation(module, "Simulation");
   simulation.def(nb::init<const data::Scene&, int, int, const std::string&>());
   simulation.def("step", &Simulation::step);
-  simulation.def("time_steps", &Simulation::time_steps);
+  simulation.def("time_steps", [](Simulation& s, const std::string& end_effector, const Numbers& poses) {
+    return s.time_steps(end_effector, tensor_of(poses));
+  });
   simulation.def("close", &Simulation::close);
   module.def("check_device", &check_device);
 
