@@ -1,5 +1,6 @@
 """Simulations on a CUDA device beside those of the processor, and their arrays in the hands of others."""
 import ctypes
+import json
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from conftest import start, write_scene
 from test_state import lift
 
 import flash_sim
-from flash_sim import arguments, to_host
+from flash_sim import arguments, folds, to_host
 from flash_sim.device_array import DeviceArray
 from flash_sim.tasks import FoldSettings, FoldTask, FoldTeacher
 
@@ -210,9 +211,19 @@ def test_arrays_of_the_processor_go_round(device, scene):
         assert np.array_equal(to_host(array), array) and not np.shares_memory(to_host(array), array)
 
 
-def test_the_teacher_folds_a_towel_on_the_device(cuda):
-    task = FoldTask(4, FoldSettings(randomization="published", seed=5), device="cuda")
-    assert task.sim.device == "cuda:0"
+@pytest.fixture
+def plain_fold(tmp_path):
+    """The towel's, whose layers pass through each other: a device has no self-contact."""
+    scene = json.loads((folds.SCENES / "towel.json").read_text())
+    del scene["self_contact"]
+    scene["objects"]["towel"]["asset"] = str(folds.SCENES / "towel_asset.json")
+    (tmp_path / "plain.json").write_text(json.dumps(scene))
+    return folds.Fold(str(tmp_path / "plain.json"), folds.FOLDS["towel"].stages)
+
+
+def test_the_teacher_folds_a_towel_on_each_device(plain_fold, device):
+    task = FoldTask(4, FoldSettings(plain_fold, randomization="published", seed=5), device=device)
+    assert task.sim.device.startswith(device)
     teacher, folded = FoldTeacher(task), np.zeros(4, bool)
     for _ in range(task.time_limit):
         observations, _, success, _ = task.step(teacher.act(task))
@@ -221,3 +232,30 @@ def test_the_teacher_folds_a_towel_on_the_device(cuda):
         if folded.all():
             break
     assert folded.all()
+
+
+def test_episodes_of_gymnasium_on_each_device(plain_fold, device):
+    pytest.importorskip("gymnasium")
+    from flash_sim.gym import FoldVectorEnv
+    env = FoldVectorEnv(3, FoldSettings(plain_fold, steps_per_action=1, time_limit=2), device=device)
+    observations, _ = env.reset(seed=3)
+    for step in range(2):
+        observations, rewards, terminated, truncated, infos = env.step(np.zeros((3, 4)))
+    assert truncated.all() and (infos["final_obs"] != observations).any() and np.isfinite(rewards).all()
+    assert (to_host(env.task.sim.status()["steps"]) == 0).all()
+
+
+def test_episodes_of_rsl_rl_on_each_device(plain_fold, device):
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("rsl_rl")
+    from flash_sim.rsl import FoldVecEnv
+    tensors = "cuda" if device == "cuda" and torch.cuda.is_available() else "cpu"
+    env = FoldVecEnv(2, FoldSettings(plain_fold, steps_per_action=1, time_limit=3), device=tensors, sim_device=device)
+    observations, rewards, dones, _ = env.step(torch.zeros(2, 4, device=tensors))
+    assert observations["policy"].device.type == rewards.device.type == tensors and dones.tolist() == [0, 0]
+
+
+def test_folds_with_self_contact_are_refused_on_a_device(cuda):
+    with pytest.raises(ValueError, match="self-contact"):
+        FoldTask(1, device="cuda")
+    assert FoldTask(1).sim.device == "cpu"
