@@ -14,6 +14,7 @@ RUNS ?= 20
 KIND ?= lift
 
 PYTHON ?= /usr/bin/python3
+PYTHON_DEVICE ?= cpu
 REFERENCE ?= tests/reference
 
 sysid = $(BUILD)/bin/flash-sysid
@@ -22,7 +23,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study ridge-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
-.PHONY: sanitize-threads python-test configure-test format check-format check-includes tidy
+.PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
 .PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -201,6 +202,9 @@ endef
 
 python-test: packages-build packages-test  ## Build the wheel of flash_sim in build/python, install it and run its tests
 	scripts/python-test $(PYTHON)
+
+python-rate: python-test  ## Say how fast 128 environments step from Python beside C++, on PYTHON_DEVICE=cpu or cuda
+	build/python-venv/bin/python -P tests/validation/python_rate.py --device $(PYTHON_DEVICE)
 
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i

@@ -10,6 +10,7 @@
 #include "sim/cuda/hold_motion.h"
 #include "sim/cuda/mesh_order.h"
 #include "sim/cuda/replay_reader.h"
+#include "sim/device_copies.h"
 #endif
 
 namespace flash::sim {
@@ -168,25 +169,23 @@ class Stepper final : public DeviceWorlds {
   const double* positions() override { return ordered(positions_, memory_.positions); }
   const double* velocities() override { return ordered(velocities_, memory_.velocities); }
 
-  const double* copy_of(std::span<const double> numbers) override {
-    for (const Copy& copy : copies_)
-      if (copy.from.data() == numbers.data()) return copy.to.data();
-    return ask_device([&] {
-      cuda::use_device(memory_.device);
-      copies_.push_back({numbers, cuda::DeviceArray<double>(numbers.size())});
-      copies_.back().to.write(0, numbers.data(), numbers.size());
-      return static_cast<const double*>(copies_.back().to.data());
-    });
-  }
+  const double* copy_of(std::span<const double> numbers) override { return copies_.of(numbers); }
 
   void renew() override {
     ask_device([&] {
       cuda::use_device(memory_.device);
       if (positions_.size() > 0) put_in_order(positions_, memory_.positions);
       if (velocities_.size() > 0) put_in_order(velocities_, memory_.velocities);
-      for (Copy& copy : copies_) copy.to.write(0, copy.from.data(), copy.from.size());
-      memory_.wait();
+      cuda::check(cudaStreamSynchronize(cudaStreamPerThread));
     });
+    copies_.renew();
+  }
+
+  void take_views(DeviceWorlds& before) override {
+    auto& other = static_cast<Stepper&>(before);
+    positions_ = std::move(other.positions_);
+    velocities_ = std::move(other.velocities_);
+    renew();
   }
 
   std::vector<double> phase_ticks() override {
@@ -197,12 +196,6 @@ class Stepper final : public DeviceWorlds {
   }
 
  private:
-  /// Numbers of the host, and where they are on the device.
-  struct Copy {
-    std::span<const double> from;
-    cuda::DeviceArray<double> to;
-  };
-
   int size() const { return static_cast<int>(worlds_.size()); }
   World& world(int e) { return worlds_[static_cast<std::size_t>(e)]; }
   char& is_here(int e) { return is_here_[static_cast<std::size_t>(e)]; }
@@ -328,15 +321,16 @@ class Stepper final : public DeviceWorlds {
       if (to.size() == 0) {
         to = cuda::DeviceArray<double>(3 * from.size());
         put_in_order(to, from);
-        memory_.wait();
+        cuda::check(cudaStreamSynchronize(cudaStreamPerThread));
       }
       return static_cast<const double*>(to.data());
     });
   }
 
+  /// In order with the default stream, on which others may still read: what steps does not wait for that.
   void put_in_order(const cuda::DeviceArray<double>& to, const cuda::DeviceArray<cuda::Point>& from) {
     cuda::put_in_mesh_order(from.data(), memory_.order.data(), memory_.layout.size, memory_.count, to.data(),
-                            memory_.stream);
+                            cudaStreamPerThread);
   }
 
   std::vector<World>& worlds_;
@@ -346,7 +340,7 @@ class Stepper final : public DeviceWorlds {
   std::vector<char> is_here_;  ///< whether the state of a world is that of the device
   int frames_ = 0;             ///< of the schedules, at most
   cuda::DeviceArray<double> positions_, velocities_;
-  std::vector<Copy> copies_;
+  DeviceCopies copies_{memory_.device};
   std::vector<double> ticks_before_;  ///< those that were asked for
 };
 

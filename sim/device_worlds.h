@@ -39,8 +39,12 @@ class DeviceWorlds {
   virtual const double* velocities() = 0;  ///< likewise [m/s]
   /// A copy of numbers of the host, which stay where they are.
   virtual const double* copy_of(std::span<const double> numbers) = 0;
-  /// Brings all of them to what is now.
+  /// Brings all of them to what is now. What others have queued on the default stream comes before.
   virtual void renew() = 0;
+
+  /// Its positions and velocities are from now on where `before` has them, of which nothing is asked any
+  /// more.
+  virtual void take_views(DeviceWorlds& before) = 0;
 
   /// Ticks that processors spent in each ReplayPhase since they were last asked for.
   virtual std::vector<double> phase_ticks() = 0;

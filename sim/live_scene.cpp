@@ -7,6 +7,8 @@
 
 #include "data/files/error.h"
 #include "data/numbers/worst.h"
+#include "sim/device_copies.h"
+#include "sim/live_forces.h"
 #include "sim/named.h"
 #include "sim/scene/scene.h"
 #include "sim/scene_worlds.h"
@@ -23,7 +25,6 @@ struct LiveEffector {
   EndEffector effector;
   std::vector<EndEffectorNumbers> numbers;  ///< in each of the worlds
   std::vector<double> start_poses, poses;   ///< environments x 7
-  std::vector<double> forces;               ///< environments x 3 [N]
   std::vector<bool> closed;                 ///< by environment
 };
 
@@ -77,7 +78,9 @@ struct LiveScene::Storage {
   std::deque<LiveEffector> effectors;  ///< whose numbers stay where they are
   std::vector<int> every;
   std::vector<WorldStatus> status;
+  LiveForces forces;
   LiveCameras cameras;
+  std::unique_ptr<DeviceCopies> copies;  ///< on the device that steps; null: the processor
 
   /// The environments that are meant, each once.
   std::span<const int> chosen_of(const Chosen& chosen) const {
@@ -139,22 +142,8 @@ struct LiveScene::Storage {
       status[index] = worlds.front().status(e);
       for (const Worlds& of_object : worlds) merge(of_object.status(e), status[index]);
     }
-    for (LiveEffector& live : effectors) {
-      std::fill(live.forces.begin(), live.forces.end(), 0.0);
-      for (std::size_t w = 0; w < worlds.size(); ++w)
-        for (const int e : every) {
-          const StepReport& report = worlds[w].report(e);
-          add_force(report.hold_forces, live.numbers[w].hold, e, live.forces);
-          add_force(report.obstacle_forces, live.numbers[w].obstacle, e, live.forces);
-        }
-    }
-  }
-
-  /// Adds a force to that of environment e. There is none before the first step, nor of what is no obstacle.
-  static void add_force(const std::vector<Eigen::Vector3d>& forces, int number, int e,
-                        std::vector<double>& sum) {
-    if (number < 0 || number >= std::ssize(forces)) return;
-    Eigen::Map<Eigen::Vector3d>(sum.data() + 3 * e) += forces[static_cast<std::size_t>(number)];
+    forces.renew(worlds);
+    if (copies) copies->renew();
   }
 
   bool is_given(const std::vector<Tensor>& given, std::size_t o, std::size_t w) const {
@@ -213,19 +202,30 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, co
   std::iota(s.every.begin(), s.every.end(), 0);
   s.status.resize(s.every.size());
   s.cameras = LiveCameras(names_of(s.objects), rigid_bodies(scene, s.worlds.front().environment(0)));
+  const std::vector<std::string> surfaces = obstacles();
+  for (int k = 0; k < std::ssize(surfaces); ++k)
+    s.forces.add(surfaces[static_cast<std::size_t>(k)],
+                 std::vector(s.worlds.size(), EndEffectorNumbers{.frame = -1, .hold = -1, .obstacle = k}),
+                 environments);
+  if (device.device == Device::cuda)
+    s.copies = std::make_unique<DeviceCopies>(device.cuda_devices.empty() ? 0 : device.cuda_devices.front());
   s.show();
 }
 
 LiveScene::~LiveScene() = default;
 
 int LiveScene::size() const { return storage_->environments; }
+DeviceChoice LiveScene::device() const {
+  if (!storage_->copies) return {};
+  return {Device::cuda, {storage_->copies->cuda_device()}};
+}
 double LiveScene::time_step() const { return storage_->time_step; }
 const std::vector<LiveObject>& LiveScene::objects() const { return storage_->objects; }
 std::vector<std::string> LiveScene::end_effectors() const { return storage_->effector_names(); }
 const std::vector<std::string>& LiveScene::notices() const { return storage_->notices; }
 
 std::vector<std::string> LiveScene::obstacles() const {
-  return names_of(storage_->worlds.front().environment(0).obstacles);
+  return names_of(storage_->worlds.front().given(0).obstacles);
 }
 
 void LiveScene::add_end_effector(const EndEffector& effector, const Tensor& poses) {
@@ -242,9 +242,9 @@ void LiveScene::add_end_effector(const EndEffector& effector, const Tensor& pose
   const auto* numbers = static_cast<const double*>(poses.data);
   live.start_poses.assign(numbers, numbers + 7 * s.every.size());
   live.poses = live.start_poses;
-  live.forces.resize(3 * s.every.size());
   live.closed.resize(s.every.size());
   s.cameras.add_body(rigid_body(effector, live.numbers.front().frame));
+  s.forces.add(effector.name, live.numbers, s.environments);
   s.effectors.push_back(std::move(live));
 }
 
@@ -283,7 +283,7 @@ std::vector<int> LiveScene::held(const std::string& name) const {
   std::vector<int> counts(storage_->every.size());
   for (std::size_t w = 0; w < storage_->worlds.size(); ++w)
     for (std::size_t e = 0; e < counts.size(); ++e) {
-      const std::vector<HeldVertices>& held = storage_->worlds[w].environment(static_cast<int>(e)).state.held;
+      const std::vector<HeldVertices>& held = storage_->worlds[w].given(static_cast<int>(e)).state.held;
       const auto hold = static_cast<std::size_t>(live.numbers[w].hold);
       if (hold < held.size()) counts[e] += static_cast<int>(held[hold].vertices.size());
     }
@@ -307,7 +307,7 @@ bool LiveScene::uses_material_friction(const std::string& object) const {
   const Worlds& worlds = storage_->worlds[own.worlds];
   constexpr double none = -1;
   return std::any_of(storage_->every.begin(), storage_->every.end(), [&](int e) {
-    const std::vector<Obstacle>& obstacles = worlds.environment(e).obstacles;
+    const std::vector<Obstacle>& obstacles = worlds.given(e).obstacles;
     return std::any_of(obstacles.begin(), obstacles.end(), [&](const Obstacle& obstacle) {
       return friction_on(obstacle, own.body, none) == none;
     });
@@ -338,7 +338,8 @@ void LiveScene::set_velocities(const std::string& object, const Chosen& environm
   Worlds& worlds = s.worlds[own.worlds];
   const std::vector<double> rows = s.rows_for(
       own.worlds, chosen, given, [&](int e) { return worlds.environment(e).state.velocities.data(); });
-  worlds.set_velocities(environments, dense(rows, {std::ssize(chosen), worlds.velocities().shape[1], 3}));
+  worlds.set_velocities(environments,
+                        dense(rows, {std::ssize(chosen), s.starts[own.worlds].positions.rows(), 3}));
 }
 
 void LiveScene::reset(const Chosen& environments, const std::vector<Tensor>& positions,
@@ -389,7 +390,11 @@ void LiveScene::step(int count) {
       stop_motion(s.worlds);
     }
   } else {
-    sim::step(s.worlds, s.threads, count);
+    // A device is given what moves in all steps of a call.
+    constexpr int most_on_device = 100;
+    const int part = s.copies ? std::min(count, most_on_device) : count;
+    for (int taken = 0; taken < count; taken += part)
+      sim::step(s.worlds, s.threads, std::min(part, count - taken));
   }
   s.interrupted = false;
   s.show();
@@ -407,8 +412,8 @@ Tensor LiveScene::velocities(const std::string& object) const {
   return Storage::rows_of(own, storage_->worlds[own.worlds].velocities());
 }
 
-Tensor LiveScene::force(const std::string& end_effector) const {
-  return dense(storage_->effector(end_effector).forces, {size(), 3});
+Tensor LiveScene::force(const std::string& name) const {
+  return dense(storage_->forces.of(name), {size(), 3});
 }
 
 Tensor LiveScene::pose(const std::string& end_effector) const {
@@ -418,6 +423,18 @@ Tensor LiveScene::pose(const std::string& end_effector) const {
 Tensor LiveScene::status() const {
   constexpr std::int64_t columns = sizeof(WorldStatus) / sizeof(double);
   return {.data = &storage_->status.front().steps, .shape = {size(), columns}};
+}
+
+Tensor LiveScene::on_device(const Tensor& view) const {
+  DeviceCopies* copies = storage_->copies.get();
+  if (copies == nullptr || view.device == Device::cuda) return view;
+  std::size_t count = 1;
+  for (const std::int64_t length : view.shape) count *= static_cast<std::size_t>(length);
+  Tensor there = view;
+  there.data = copies->of({static_cast<const double*>(view.data), count});
+  there.device = Device::cuda;
+  there.device_number = device().cuda_devices.front();
+  return there;
 }
 
 const std::string& LiveScene::why_lost(int environment) const {

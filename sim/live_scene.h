@@ -37,7 +37,8 @@ class LiveScene {
   ~LiveScene();
 
   int size() const;
-  double time_step() const;  ///< [s]
+  DeviceChoice device() const;  ///< where they are stepped; a CUDA device has its number
+  double time_step() const;     ///< [s]
   const std::vector<LiveObject>& objects() const;
   std::vector<std::string> end_effectors() const;   ///< those that were added, in their order
   std::vector<std::string> obstacles() const;       ///< of the scene, and end effectors that collide
@@ -93,13 +94,17 @@ class LiveScene {
   /// Ends a `step` in another thread soon.
   void stop();
 
-  // Views that stay where they are, those of positions and velocities where the environments are, and on a
-  // device until an end effector is added. What is in them is as it was at the end of the last step.
-  Tensor positions(const std::string& object) const;    ///< environments x vertices x 3 [m]
-  Tensor velocities(const std::string& object) const;   ///< environments x vertices x 3 [m/s]
-  Tensor force(const std::string& end_effector) const;  ///< it on the objects: environments x 3 [N]
-  Tensor pose(const std::string& end_effector) const;   ///< where it was told to be: environments x 7
+  // Views that stay where they are, those of positions and velocities where the environments are, the others
+  // on the processor. What is in them is as it was at the end of the last step.
+  Tensor positions(const std::string& object) const;   ///< environments x vertices x 3 [m]
+  Tensor velocities(const std::string& object) const;  ///< environments x vertices x 3 [m/s]
+  /// Of an end effector or an obstacle on the objects: environments x 3 [N].
+  Tensor force(const std::string& name) const;
+  Tensor pose(const std::string& end_effector) const;  ///< where it was told to be: environments x 7
   Tensor status() const;  ///< environments x 7, the fields of WorldStatus, the worst of the objects
+
+  /// A view of forces or of the status where the environments are: on a device a copy that goes with it.
+  Tensor on_device(const Tensor& view) const;
 
   /// Why an environment is lost; empty where it is not.
   const std::string& why_lost(int environment) const;

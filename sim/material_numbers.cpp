@@ -38,7 +38,7 @@ MaterialNumbers numbers_of(const Worlds& worlds, int body, const Values& values,
   MaterialNumbers numbers;
   for (const auto& known : values) {
     std::vector<double>& column = numbers.emplace_back(known.name, std::vector<double>()).second;
-    for (int e = 0; e < worlds.size(); ++e) column.push_back(of(worlds.environment(e), body).*known.value);
+    for (int e = 0; e < worlds.size(); ++e) column.push_back(of(worlds.given(e), body).*known.value);
   }
   return numbers;
 }
@@ -46,9 +46,9 @@ MaterialNumbers numbers_of(const Worlds& worlds, int body, const Values& values,
 template <class Values, class Of>
 void set_numbers(Worlds& worlds, int body, std::span<const int> chosen, const MaterialNumbers& numbers,
                  const Values& values_of, const Of& of) {
-  std::vector<std::remove_cvref_t<decltype(of(worlds.environment(0), body))>> materials;
+  std::vector<std::remove_cvref_t<decltype(of(worlds.given(0), body))>> materials;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    materials.push_back(of(worlds.environment(chosen[i]), body));
+    materials.push_back(of(worlds.given(chosen[i]), body));
     for (const auto& [name, values] : numbers) set_value(values_of, name, values[i], materials.back());
   }
   worlds.set_materials(Chosen(chosen), materials, body);

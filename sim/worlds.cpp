@@ -230,7 +230,11 @@ EndEffectorNumbers Worlds::add(const EndEffector& effector, const Tensor& poses)
   s.hold_forces.assign(s.worlds.size() * 3 * static_cast<std::size_t>(s.holds), 0.0);
   s.obstacle_forces.assign(s.worlds.size() * 3 * static_cast<std::size_t>(s.obstacles), 0.0);
   // What a device has of an environment is as large as its holds and obstacles ask for.
-  if (s.device) s.device = device_worlds(s.plan, s.worlds, s.settings);
+  if (s.device) {
+    std::unique_ptr<DeviceWorlds> anew = device_worlds(s.plan, s.worlds, s.settings);
+    anew->take_views(*s.device);
+    s.device = std::move(anew);
+  }
   return numbers;
 }
 
@@ -417,6 +421,7 @@ const Environment& Worlds::environment(int environment) const {
   if (storage_->device) storage_->device->read_state(environment);
   return storage_->at(environment).environment;
 }
+const Environment& Worlds::given(int environment) const { return storage_->at(environment).environment; }
 const StepReport& Worlds::report(int environment) const { return storage_->at(environment).report; }
 std::vector<ContactForce> Worlds::contacts(int environment) const {
   return contacts_of(storage_->at(environment));

@@ -77,8 +77,8 @@ class Worlds {
   int size() const;
 
   /// Gives every environment an end effector, open, at its pose: environments x 7. The tensors of forces are
-  /// others from then on, and all views of a device, which takes the memory of the environments anew before
-  /// it gives back what they had. Throws data::InputError where a step has been taken, where the environments
+  /// others from then on. A device takes the memory of the environments anew before it gives back what they
+  /// had. Throws data::InputError where a step has been taken, where the environments
   /// differ in the number of their frames or obstacles, for what is no size, threshold or friction, and for
   /// an obstacle more than a device meets.
   EndEffectorNumbers add(const EndEffector& effector, const Tensor& poses);
@@ -126,8 +126,8 @@ class Worlds {
             std::span<const int> positions_at = {});
 
   // Views of numbers where the environments are. They stay where they are as long as the worlds do, those of
-  // forces and of a device until an end effector is added. What is in them is as it was at the end of the
-  // last `step`. Those of a device take their memory when they are first asked for.
+  // forces, and of the status of a device, until an end effector is added. What is in them is as it was at
+  // the end of the last `step`. Those of a device take their memory when they are first asked for.
   Tensor positions() const;        ///< environments x vertices x 3 [m]
   Tensor velocities() const;       ///< environments x vertices x 3 [m/s]
   Tensor hold_forces() const;      ///< hold on sheet: environments x holds x 3 [N]
@@ -142,6 +142,9 @@ class Worlds {
   /// Up to the last step that it has taken. Brings its state from a device first; threads may ask for
   /// different ones at the same time.
   const Environment& environment(int environment) const;
+  /// The same as it was given, with what it holds: its positions and velocities may be old ones on a device,
+  /// which is not asked.
+  const Environment& given(int environment) const;
   /// A device says nothing of the work, of gravitational energy, and of what is held or starts inside
   /// obstacles: these are zero.
   const StepReport& report(int environment) const;

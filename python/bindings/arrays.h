@@ -14,9 +14,11 @@ using Numbers = nanobind::ndarray<const double, nanobind::c_contig, nanobind::de
 /// The same for the simulation. It does not own them.
 sim::Tensor tensor_of(const Numbers& numbers);
 
-/// A read-only array of numpy on the memory of a tensor, which `owner` keeps alive as long as the array
-/// lives.
-nanobind::ndarray<nanobind::numpy, const double> view_of(const sim::Tensor& tensor,
-                                                         const std::shared_ptr<const void>& owner);
+/// A read-only array on the memory of a tensor, which `owner` keeps alive as long as the array lives: one of
+/// numpy, or on a CUDA device an object that DLPack takes.
+nanobind::object view_of(const sim::Tensor& tensor, const std::shared_ptr<const void>& owner);
+
+/// What arrays on a device need: `to_host` copies one to numpy, `placed` says where it stands.
+void bind_arrays(nanobind::module_& module);
 
 }  // namespace flash::python

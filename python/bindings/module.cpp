@@ -7,7 +7,9 @@
 #include "data/asset/asset.h"
 #include "data/files/error.h"
 #include "data/scene/scene.h"
+#include "python/bindings/arrays.h"
 #include "python/bindings/simulation.h"
+#include "sim/device_error.h"
 
 namespace flash::python {
 
@@ -15,13 +17,19 @@ namespace nb = nanobind;
 
 namespace {
 
-/// Bad input is a ValueError with the same line.
+/// Bad input is a ValueError with the same line, in which a device is no option of a program.
 void raise_input_errors() {
   nb::register_exception_translator([](const std::exception_ptr& error, void*) {
     try {
       std::rethrow_exception(error);
     } catch (const data::InputError& bad) {
-      PyErr_SetString(PyExc_ValueError, bad.what());
+      std::string line = bad.what();
+      const std::string option = "--device";
+      for (std::size_t at = line.find(option); at != std::string::npos; at = line.find(option, at))
+        line.replace(at, option.size(), "device");
+      PyErr_SetString(PyExc_ValueError, line.c_str());
+    } catch (const sim::OutOfDeviceMemory& full) {
+      PyErr_SetString(PyExc_MemoryError, full.what());
     }
   });
 }
@@ -46,5 +54,6 @@ NB_MODULE(_core, module) {
   module.attr("__version__") = FLASH_VERSION;
   flash::python::raise_input_errors();
   flash::python::bind_scene(module);
+  flash::python::bind_arrays(module);
   flash::python::bind_simulation(module);
 }

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <chrono>
+#include <exception>
 #include <future>
 #include <memory>
 #include <optional>
@@ -17,6 +18,7 @@
 #include "data/files/error.h"
 #include "python/bindings/arrays.h"
 #include "python/bindings/cameras.h"
+#include "sim/named.h"
 
 namespace flash::python {
 
@@ -39,6 +41,22 @@ std::vector<sim::Tensor> tensors_of(const std::vector<std::optional<Numbers>>& a
   return tensors;
 }
 
+/// The choice of one device.
+sim::DeviceChoice one_device(const std::string& name) {
+  sim::DeviceChoice choice = sim::choose_device(name);
+  if (choice.cuda_devices.size() > 1)
+    throw data::InputError("--device: found \"" + name + "\", expected one device");
+  return choice;
+}
+
+sim::Tensor column_of(const sim::Tensor& rows, int column) {
+  sim::Tensor tensor = rows;
+  tensor.data = static_cast<const double*>(rows.data) + column;
+  tensor.shape = {rows.shape[0]};
+  tensor.strides = {rows.shape[1]};
+  return tensor;
+}
+
 nb::ndarray<nb::numpy, int> triangles_of(const sim::LiveObject& object) {
   auto* numbers = new std::vector<int>(static_cast<std::size_t>(object.triangles.size()));
   const nb::capsule owner(numbers, [](void* kept) noexcept { delete static_cast<std::vector<int>*>(kept); });
@@ -50,10 +68,56 @@ nb::ndarray<nb::numpy, int> triangles_of(const sim::LiveObject& object) {
 
 }  // namespace
 
+void check_device(const std::string& device) { one_device(device); }
+
+Simulation::Simulation(const data::Scene& scene, int environments, int threads, const std::string& device) {
+  sim::DeviceChoice choice = one_device(device);
+  if (choice.device == sim::Device::cuda) {
+    const sim::KeptCudaDevice kept;
+    try {
+      live_ = std::make_shared<sim::LiveScene>(scene, environments, threads, choice);
+    } catch (const std::exception& error) {
+      if (device != "auto") throw;
+      why_not_cuda_ = error.what();
+    }
+  }
+  if (!live_) live_ = std::make_shared<sim::LiveScene>(scene, environments, threads);
+  choice = live_->device();
+  on_cuda_ = choice.device == sim::Device::cuda;
+  if (on_cuda_) device_ = "cuda:" + std::to_string(choice.cuda_devices.front());
+}
+
+std::vector<std::string> Simulation::notices() {
+  std::vector<std::string> all = use([](sim::LiveScene& live) { return live.notices(); });
+  if (!why_not_cuda_.empty()) all.push_back("device: the processor steps it (" + why_not_cuda_ + ")");
+  return all;
+}
+
+void Simulation::close() {
+  use([&](sim::LiveScene&) { live_.reset(); });
+}
+
+double Simulation::time_steps(const std::string& end_effector, const sim::Tensor& poses) {
+  return use([&](sim::LiveScene& live) {
+    const nb::gil_scoped_release release;
+    const auto steps = [&] {
+      sim::Tensor of_step{.data = poses.data, .shape = {live.size(), 7}};
+      for (std::int64_t k = 0; k < poses.shape[0]; ++k) {
+        live.move_end_effector(end_effector, {}, of_step);
+        live.step();
+        of_step.data = static_cast<const double*>(of_step.data) + 7 * live.size();
+      }
+    };
+    const auto start = std::chrono::steady_clock::now();
+    worker_.start(steps).get();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  });
+}
+
 void Simulation::step(int count) {
   use([&](sim::LiveScene& live) {
-    // In a thread of its own, so that this one can see signals. That costs some 20 microseconds.
-    std::future<void> steps = std::async(std::launch::async, [&] { live.step(count); });
+    // In a thread of its own, so that this one can see signals.
+    std::future<void> steps = worker_.start([&] { live.step(count); });
     const auto ended = [&](std::chrono::milliseconds time) {
       const nb::gil_scoped_release release;
       return steps.wait_for(time) == std::future_status::ready;
@@ -79,18 +143,29 @@ void bind_simulation(nb::module_& module) {
                          "Environments as they stood. What it holds load_state alone reads.");
 
   nb::class_<Simulation> simulation(module, "Simulation");
-  simulation.def(nb::init<const data::Scene&, int, int>());
+  simulation.def(nb::init<const data::Scene&, int, int, const std::string&>());
   simulation.def("step", &Simulation::step);
+  simulation.def("time_steps", [](Simulation& s, const std::string& end_effector, const Numbers& poses) {
+    return s.time_steps(end_effector, tensor_of(poses));
+  });
+  simulation.def("close", &Simulation::close);
+  module.def("check_device", &check_device);
 
   // What it is made of.
   simulation.def("time_step",
                  [](Simulation& s) { return s.use([](LiveScene& live) { return live.time_step(); }); });
-  simulation.def("notices",
-                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.notices(); }); });
+  simulation.def("device", &Simulation::device);
+  simulation.def("notices", &Simulation::notices);
   simulation.def("obstacles",
                  [](Simulation& s) { return s.use([](LiveScene& live) { return live.obstacles(); }); });
   simulation.def("end_effectors",
                  [](Simulation& s) { return s.use([](LiveScene& live) { return live.end_effectors(); }); });
+  simulation.def("vertices", [](Simulation& s, const std::string& object) {
+    return s.use([&](LiveScene& live) {
+      const auto& all = live.objects();
+      return all[sim::number_of("object", object, sim::names_of(all))].vertices;
+    });
+  });
   simulation.def("objects", [](Simulation& s) {
     return s.use([](LiveScene& live) {
       nb::dict objects;
@@ -134,11 +209,23 @@ void bind_simulation(nb::module_& module) {
   };
   def_view("positions", &LiveScene::positions);
   def_view("velocities", &LiveScene::velocities);
-  def_view("force", &LiveScene::force);
   def_view("pose", &LiveScene::pose);
-  simulation.def("status", [](Simulation& s) {
-    return s.use([&](LiveScene& live) { return view_of(live.status(), s.shared()); });
+  // On a device as well, where that steps.
+  simulation.def("force", [](Simulation& s, const std::string& of, bool on_device) {
+    return s.use([&](LiveScene& live) {
+      const sim::Tensor force = live.force(of);
+      return view_of(on_device ? live.on_device(force) : force, s.shared());
+    });
   });
+  simulation.def(
+      "status",
+      [](Simulation& s, bool on_device, std::optional<int> column) {
+        return s.use([&](LiveScene& live) {
+          sim::Tensor status = on_device ? live.on_device(live.status()) : live.status();
+          return view_of(column ? column_of(status, *column) : status, s.shared());
+        });
+      },
+      nb::arg("on_device") = false, nb::arg("column") = nb::none());
   simulation.def("why_lost", [](Simulation& s) {
     return s.use([](LiveScene& live) {
       std::vector<std::string> reasons;

@@ -1,15 +1,14 @@
 """Arguments of calls as numbers that the simulation takes, or an error that names what was found and what was expected."""
 import numpy as np
 
+from flash_sim.device_array import on_host
+
 UNIT_TOLERANCE = 1e-3  # of the length of a quaternion, as in files of trajectories
 
 
 def numbers(what, value, *shapes):
     """`value` as a dense array of float64 and of one of `shapes`, whose None stands for any length."""
-    try:
-        array = np.asarray(value)
-    except Exception as error:  # a tensor on another device, nested lists of different lengths
-        raise TypeError(f"{what}: found {_kind(value)} ({error}), expected numbers in the memory of the CPU") from error
+    array = _array(what, value)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{what}: found {_kind(value)}, expected numbers")
     if shapes and not any(_fits(array.shape, shape) for shape in shapes):
@@ -19,6 +18,15 @@ def numbers(what, value, *shapes):
         at = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"{what}: found {array[at]} at {at}, expected finite numbers")
     return array
+
+
+def _array(what, value):
+    """Of numpy; of what is on a CUDA device a copy."""
+    try:
+        return np.asarray(on_host(value))
+    except Exception as error:  # a tensor on another device, nested lists of different lengths
+        line = " ".join(str(error).split())
+        raise TypeError(f"{what}: found {_kind(value)} ({line}), expected an array of the CPU or of CUDA") from error
 
 
 def per_environment(what, value, count):
@@ -42,7 +50,7 @@ def poses(what, value, current):
 
 def truths(what, value, count):
     """A bool, or one for each of `count` environments, as an array of `count`."""
-    array = np.asarray(value)
+    array = _array(what, value)
     if array.dtype != bool:
         raise TypeError(f"{what}: found {_kind(value)}, expected True or False")
     if array.shape not in ((), (count,)):
@@ -54,7 +62,7 @@ def environments(what, value, count):
     """Numbers of environments: None for all of `count`, a number, several, or a mask of `count` bools."""
     if value is None:
         return list(range(count))
-    array = np.atleast_1d(np.asarray(value))
+    array = np.atleast_1d(_array(what, value))
     if array.dtype == bool:
         if array.shape != (count,):
             raise ValueError(f"{what}: found a mask of the shape {array.shape}, expected {_name((count,))}")

@@ -11,10 +11,10 @@ from flash_sim.tasks import FoldTask
 class FoldVectorEnv(VectorEnv):
     """FoldTask. An episode that ends is followed by the next one's start in the same step (SAME_STEP): infos["final_obs"] has
     the last observations where infos["_final_obs"] is true. With autoreset=False (DISABLED) reset(options={"reset_mask":
-    mask}) starts anew."""
+    mask}) starts anew. `device` and `threads` are those of the simulation."""
 
-    def __init__(self, num_envs, settings=None, threads=0, autoreset=True):
-        self.task = FoldTask(num_envs, settings, threads)
+    def __init__(self, num_envs, settings=None, threads=0, autoreset=True, device="auto"):
+        self.task = FoldTask(num_envs, settings, threads, device)
         self.num_envs = num_envs
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP if autoreset else AutoresetMode.DISABLED}
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.task.observations,), np.float64)

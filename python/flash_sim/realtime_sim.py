@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 
 from flash_sim import _core, arguments, cameras
 from flash_sim.asset import Asset
+from flash_sim.device_array import DeviceArray, DeviceStatus
 
 STATUS = np.dtype([(name, np.float64) for name in
                    ("steps", "time", "converged", "residual", "penetration", "parts", "lost")])
@@ -26,16 +27,19 @@ class RealtimeSim:
     What is given holds from the next step on.
 
     positions, velocities, force and status are live: read-only views on the memory of the simulation, which show the
-    end of the last step. Copy what has to stay. After another initialize() an old view keeps its last numbers.
+    end of the last step. Copy what has to stay: flash_sim.to_host(view) does on any device. On the processor they are arrays
+    of numpy, of which an old one keeps its last numbers after another initialize(). On a CUDA device they are DeviceArray.
+    What is given may be on such a device as well; it is copied through the memory of the processor.
 
     A refused argument raises ValueError or TypeError with its name, what was found and what was expected, and changes
     nothing. An environment whose step fails is lost: status()["lost"] is not 0, the others go on, and reset brings it back.
     """
 
     def __init__(self, device: str = "auto", seed: int = 0, threads: int = 0):
-        """device: "auto" or "cpu"; this package steps on the processor alone. threads: 0 takes one per processor."""
-        if arguments.text("device", device) not in ("auto", "cpu"):
-            raise ValueError(f"device: found {device!r}, expected 'auto' or 'cpu': this package has no other device yet")
+        """device: "cpu", "cuda" (the first CUDA device), or by number, as "cuda:1". "auto" is cuda where there is one that can
+        step the scene, else cpu. threads: of the processor; 0 takes one per processor."""
+        _core.check_device(arguments.text("device", device))
+        self._device = device
         self._threads = arguments.whole_number("threads", threads, 0, 1024)
         self._scene = self._simulation = None
         self._n_envs = 1
@@ -55,14 +59,25 @@ class RealtimeSim:
         self._n_envs = arguments.whole_number("set_envs: n_envs", n_envs, 1, 1_000_000)
 
     def initialize(self) -> None:
-        """Makes the environments, all at the start of the scene. End effectors are added anew after it."""
+        """Makes the environments, all at the start of the scene. End effectors are added anew after it.
+
+        ValueError where the device cannot step the scene, MemoryError where its memory does not suffice.
+        """
         if self._scene is None:
             raise RuntimeError("initialize: found no scene, expected load_config(path) before")
-        self._simulation = _core.Simulation(self._scene, self._n_envs, self._threads)
+        simulation = _core.Simulation(self._scene, self._n_envs, self._threads, self._device)
+        self.close()
+        self._simulation = simulation
         self._initialized_envs = self._n_envs
         self._triangles = self._simulation.objects()
         self._assets = self._scene.assets
         self._start_materials = {body: self.material(body) for body in self._triangles}
+
+    def close(self) -> None:
+        """Gives back what the environments take, once no array shows it any more. Only initialize() can follow."""
+        if self._simulation is not None:
+            self._simulation.close()
+        self._simulation = None
 
     def add_ee(self, name: str, start_pose: ArrayLike, size: ArrayLike = (0.05, 0.05, 0.05), reach: float = 0.01,
                friction: float | None = None, collides: bool = True) -> None:
@@ -111,23 +126,29 @@ class RealtimeSim:
 
     # -- state ----------------------------------------------------------------------------------------------------------
 
-    def positions(self, body: str | None = None) -> np.ndarray:
+    def positions(self, body: str | None = None) -> np.ndarray | DeviceArray:
         """Live (n_envs, vertices, 3) [m], in the order of the mesh. A scene of one body needs no name."""
         simulation = self._ready("positions")
-        return simulation.positions(self._body("positions: body", body))
+        body = self._body("positions: body", body)
+        return self._view(lambda: simulation.positions(body))
 
-    def velocities(self, body: str | None = None) -> np.ndarray:
+    def velocities(self, body: str | None = None) -> np.ndarray | DeviceArray:
         """Live (n_envs, vertices, 3) [m/s]."""
         simulation = self._ready("velocities")
-        return simulation.velocities(self._body("velocities: body", body))
+        body = self._body("velocities: body", body)
+        return self._view(lambda: simulation.velocities(body))
 
-    def force(self, ee: str) -> np.ndarray:
-        """Live (n_envs, 3) [N]: of an end effector on the bodies, by its hold and its surface. A wrist feels the negative."""
+    def force(self, ee: str) -> np.ndarray | DeviceArray:
+        """Live (n_envs, 3) [N]: of an end effector on the bodies, by its hold and its surface, or of an obstacle by name.
+
+        A wrist feels the negative.
+        """
         simulation = self._ready("force")
-        return simulation.force(self._effector("force: ee", ee))
+        arguments.one_of("force: ee", ee, list(dict.fromkeys(simulation.end_effectors() + simulation.obstacles())))
+        return self._view(lambda: simulation.force(ee, True), lambda: np.array(simulation.force(ee, False)))
 
     def pose(self, ee: str) -> np.ndarray:
-        """Live (n_envs, 7): where an end effector has been told to be."""
+        """Live (n_envs, 7): where an end effector has been told to be. Of numpy on any device."""
         simulation = self._ready("pose")
         return simulation.pose(self._effector("pose: ee", ee))
 
@@ -136,13 +157,19 @@ class RealtimeSim:
         simulation = self._ready("held")
         return np.array(simulation.held(self._effector("held: ee", ee)), int)
 
-    def status(self) -> np.ndarray:
+    def status(self) -> np.ndarray | DeviceStatus:
         """Live (n_envs,) of named numbers: steps, time [s], converged, residual, penetration [m], parts, lost.
 
         converged: 0 where a step is not solved to the tolerance of the scene. lost: not 0 where an environment goes no
         further, and why_lost() says why.
         """
-        return self._ready("status").status().view(STATUS)[:, 0]
+        simulation = self._ready("status")
+        if self.device == "cpu":
+            return simulation.status().view(STATUS)[:, 0]
+
+        def copy(column):
+            return np.array(simulation.status().view(STATUS)[:, 0] if column is None else simulation.status(column=column))
+        return DeviceStatus(lambda column: simulation.status(True, column), copy, STATUS.names)
 
     def why_lost(self) -> list[str]:
         """A line for each environment; empty where it is not lost."""
@@ -299,7 +326,8 @@ class RealtimeSim:
         triangles(body), -1 is nothing. "points" is float32 (n, height, width, 3), in the base frame [m], 0 0 0 is nothing.
         None: depth and instance.
 
-        Each call draws the state as it stands then, also after a reset. The arrays are new ones, which nobody changes, or
+        Each call draws the state as it stands then, also after a reset, on the processor; from a CUDA device it brings a copy
+        of it. The arrays are new ones, which nobody changes, or
         those of `out`: a dict whose arrays are written to and returned. Then its names are the pictures.
         Other threads of Python run meanwhile.
         """
@@ -312,6 +340,11 @@ class RealtimeSim:
         return drawn
 
     # -- what it is made of -----------------------------------------------------------------------------------------------
+
+    @property
+    def device(self) -> str:
+        """Where it is stepped: "cpu", or "cuda:0" with the number of the device."""
+        return self._ready("device").device()
 
     @property
     def n_envs(self) -> int:
@@ -379,6 +412,13 @@ class RealtimeSim:
             return next(iter(self._triangles))
         return arguments.one_of(what, body, list(self._triangles))
 
+    def _view(self, take, copy=None):
+        """What take() gives: an array of numpy, or on a device one that is live."""
+        array = take()
+        if isinstance(array, np.ndarray):
+            return array
+        return DeviceArray(take, copy or (lambda: _core.to_host(take())))
+
     def _effector(self, what, name):
         return arguments.one_of(what, name, self._simulation.end_effectors())
 
@@ -398,7 +438,7 @@ class RealtimeSim:
         return array
 
     def _rows(self, what, body, value, ids):
-        vertices = self._simulation.positions(body).shape[1]
+        vertices = self._simulation.vertices(body)
         given = arguments.numbers(what, value, (len(ids), vertices, 3), (vertices, 3))
         return np.ascontiguousarray(np.broadcast_to(given, (len(ids), vertices, 3)))
 

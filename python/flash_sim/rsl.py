@@ -11,10 +11,11 @@ from flash_sim.tasks import FoldTask
 
 class FoldVecEnv(VecEnv):
     """FoldTask, with its observations in the group "policy". An episode that ends is followed by the next one's start in the
-    same step; extras["time_outs"] says which ended for want of time."""
+    same step; extras["time_outs"] says which ended for want of time. `device` is that of the tensors, `sim_device` and `threads`
+    are those of the simulation; between them observations and actions go through the memory of the processor."""
 
-    def __init__(self, num_envs, settings=None, threads=0, device="cpu"):
-        self.task = FoldTask(num_envs, settings, threads)
+    def __init__(self, num_envs, settings=None, threads=0, device="cpu", sim_device="auto"):
+        self.task = FoldTask(num_envs, settings, threads, sim_device)
         self.num_envs, self.num_actions, self.device = num_envs, self.task.actions, device
         self.max_episode_length = self.task.time_limit
         self.cfg = dataclasses.asdict(self.task.settings)

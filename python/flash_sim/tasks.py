@@ -4,6 +4,7 @@ import dataclasses
 import numpy as np
 
 from flash_sim import arguments
+from flash_sim.device_array import to_host
 from flash_sim.folds import FOLDS, Fold
 from flash_sim.realtime_sim import RealtimeSim
 
@@ -42,22 +43,25 @@ class FoldTask:
     minus its place, where it is to lay minus where it is to take [m]; velocity of what it is to take [m/s]; whether it is closed,
     whether it carries anything. A hand that a stage does not need sees zeros there. Then which stage it is. A stage is done when
     all it carries lies within `near` of where it is to lie, let go and at rest, and the last one is the success.
+
+    All of these are arrays of numpy. `device` and `threads` are those of RealtimeSim. From a CUDA device the positions and
+    velocities of all vertices are copied once an action, and at a reset.
     """
 
-    def __init__(self, n_envs, settings=None, threads=0):
+    def __init__(self, n_envs, settings=None, threads=0, device="auto"):
         self.settings = FoldSettings() if settings is None else settings
         if not isinstance(self.settings, FoldSettings):
             raise TypeError(f"FoldTask: settings: found {settings!r:.60}, expected FoldSettings")
         self.n_envs = n_envs
         self.fold = _fold(self.settings.fold)
-        self.sim = RealtimeSim(threads=threads, seed=self.settings.seed)
+        self.sim = RealtimeSim(device, self.settings.seed, threads)
         self.sim.load_config(self.fold.scene)
         self.sim.set_envs(n_envs)
         self.sim.initialize()
         if len(self.sim.bodies) != 1:
             raise ValueError(f"fold: {self.fold.scene}: found {len(self.sim.bodies)} objects, expected one sheet")
         self.hands, self.stages = self.fold.hands, len(self.fold.stages)
-        self._x, self._v = self.sim.positions(), self.sim.velocities()
+        self._look()
         self._flat = np.array(self._x[0])
         # By stage and hand, -1 where a hand has nothing to do.
         self._take = np.full((self.stages, len(self.hands)), -1)
@@ -115,6 +119,7 @@ class FoldTask:
             self.sim.randomize(self.settings.randomization, seed=int(self._random.integers(2**31)), env_ids=ids)
             self.lengths[ids] = self.stage[ids] = 0
             self.closed[ids] = False
+            self._look()
         return self.observe()
 
     def observe(self):
@@ -143,6 +148,7 @@ class FoldTask:
                 place[:, 2] = np.maximum(place[:, 2], TOUCH)
                 self.sim.move_ee(hand, place)
             self.sim.step()
+        self._look()
         self.lengths += 1
         return self._judged()
 
@@ -151,13 +157,18 @@ class FoldTask:
         off_goal = np.linalg.norm(self.lay - take, axis=2) * works
         off_hand = np.linalg.norm(take - self.place, axis=2) * (works & ~carries)
         still = np.linalg.norm(self._at(self._v, self._take), axis=2) * works < self.settings.still
-        lost = self.sim.status()["lost"] != 0
+        lost = to_host(self.sim.status()["lost"]) != 0
         done = (still & (off_goal < self.settings.near)).all(axis=1) & ~carries.any(axis=1) & ~lost
         rewards = -np.nan_to_num((off_goal + off_hand).sum(axis=1), nan=1.0) + 10.0 * done
         success = done & (self.stage == self.stages - 1)
         self.stage[done & ~success] += 1
         time_out = lost | (self.lengths >= self.time_limit) & ~success
         return self.observe(), rewards, success, time_out
+
+    def _look(self):
+        """At the cloth: the views of the processor, or copies from a device."""
+        views = self.sim.positions(), self.sim.velocities()
+        self._x, self._v = views if self.sim.device == "cpu" else map(to_host, views)
 
     def _at(self, of_vertices, table):
         """Rows of the vertices that a table has for the stage of each environment, (n, hands, 3)."""

@@ -23,12 +23,22 @@ def write_scene(folder, asset=TOWEL, **changes):
     return str(folder / "scene.json")
 
 
-def start(path, n_envs=1, **settings):
-    sim = flash_sim.RealtimeSim(**settings)
+def start(path, n_envs=1, device="cpu", **settings):
+    sim = flash_sim.RealtimeSim(device, **settings)
     sim.load_config(path)
     sim.set_envs(n_envs=n_envs)
     sim.initialize()
     return sim
+
+
+@pytest.fixture(params=["cpu", "cuda"])
+def device(request):
+    """Each in turn; a CUDA device that is not there is skipped."""
+    try:
+        flash_sim.RealtimeSim(request.param)
+    except ValueError as error:
+        pytest.skip(str(error))
+    return request.param
 
 
 @pytest.fixture
@@ -37,8 +47,8 @@ def scene(tmp_path):
 
 
 @pytest.fixture
-def sim(scene):
+def sim(scene, device):
     """Three environments with an end effector over a corner of the towel."""
-    sim = start(scene, 3)
+    sim = start(scene, 3, device)
     sim.add_ee("hand", [0.2, 0.2, 0.05], size=[0.06, 0.06, 0.02], reach=0.002)
     return sim

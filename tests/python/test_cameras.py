@@ -129,7 +129,7 @@ def test_random_scenes_are_what_rays_meet(sim):
         sim.reset(positions=towels)
         sim.move_ee("hand", hands)
         sim.step()
-        towels = np.array(sim.positions())
+        towels = flash_sim.to_host(sim.positions())
         sim.set_camera("eye", eyes)
         seen = sim.render("eye", ALL)
         for e in range(3):
@@ -201,7 +201,7 @@ def test_pictures_are_of_the_present(sim):
     sim.step()
     lid = sim.render("eye")
     assert (lid["depth"][lid["instance"] == 2] == np.float32(0.29)).all()
-    sim.reset(positions=np.array(sim.positions()) + [0, 0, 0.3])
+    sim.reset(positions=flash_sim.to_host(sim.positions()) + [0, 0, 0.3])
     raised = sim.render("eye")
     assert raised["depth"][raised["instance"] == 0] == pytest.approx(0.2, abs=1e-6)
     sim.step(3)
@@ -341,7 +341,7 @@ def test_bad_calls_are_refused_by_name(sim):
 
 def test_numbers_that_are_none_hide_nothing_else(sim):
     add(sim)
-    sim.reset(0, positions=np.array(sim.positions()[:1]) * 1e300)
+    sim.reset(0, positions=flash_sim.to_host(sim.positions())[:1] * 1e300)
     sim.step()
     seen = sim.render("eye")
     assert (seen["instance"][0] == 1).any() and (seen["instance"][1] == 0).any()

@@ -50,7 +50,7 @@ MATERIALS += [{"stiffness": 1}, {"membrane_stiffness": 0}, {"friction": 0.1, "fo
 
 
 def snapshot(sim):
-    return [np.array(a) for a in (sim.positions(), sim.velocities(), sim.pose("hand"), *sim.material().values())]
+    return [flash_sim.to_host(a) for a in (sim.positions(), sim.velocities(), sim.pose("hand"), *sim.material().values())]
 
 
 def expect_refusal(sim, call, arguments, named=True):
@@ -74,7 +74,7 @@ def test_every_bad_call_is_refused_by_name(sim):
     for values in MATERIALS:
         expect_refusal(sim, "set_material", values)
     sim.step()
-    assert (sim.status()["lost"] == 0).all()
+    assert (flash_sim.to_host(sim.status())["lost"] == 0).all()
 
 
 METHODS = [("step",), ("positions",), ("velocities",), ("force", "hand"), ("pose", "hand"), ("held", "hand"), ("status",),
@@ -94,9 +94,10 @@ def test_use_before_initialize(method, scene):
 def test_no_scene_and_no_device():
     with pytest.raises(RuntimeError, match="load_config"):
         flash_sim.RealtimeSim().initialize()
-    for device in ("cuda", "cuda:0", "", None, 3):
-        with pytest.raises((ValueError, TypeError), match="device"):
+    for device in ("cuda:99", "cuda:-1", "cuda:x", "gpu", "", "cuda:0,0", None, 3):
+        with pytest.raises((ValueError, TypeError), match="^device") as raised:
             flash_sim.RealtimeSim(device=device)
+        assert "--" not in str(raised.value) and "\n" not in str(raised.value)
 
 
 def test_end_effectors_come_before_the_first_step(sim):
@@ -114,14 +115,14 @@ def test_wild_motions_crash_nothing(sim):
                                             turn / np.linalg.norm(turn, axis=1)[:, None]], axis=1))
         sim.grasp_ee("hand", random.random(3) < 0.5)
         sim.step()
-    sim.reset(0, positions=np.array(sim.positions()[:1]) * 1e80)
+    sim.reset(0, positions=flash_sim.to_host(sim.positions())[:1] * 1e80)
     sim.set_velocities("towel", np.full((36, 3), 1e200), env_ids=1)
     sim.step(2)
-    kept = sim.status()["lost"] == 0
-    assert kept[2] and np.isfinite(sim.positions()[kept]).all()
+    kept = flash_sim.to_host(sim.status())["lost"] == 0
+    assert kept[2] and np.isfinite(flash_sim.to_host(sim.positions())[kept]).all()
     sim.reset()
     sim.step()
-    assert (sim.status()["lost"] == 0).all()
+    assert (flash_sim.to_host(sim.status())["lost"] == 0).all()
 
 
 def test_names_of_several_bodies_are_asked_for(tmp_path):

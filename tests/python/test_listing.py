@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from conftest import ROOT, SHARED
 
+import flash_sim
+
 LISTING = '''
 import flash_sim
 sim = flash_sim.RealtimeSim(); sim.load_config("path/to/scene.json"); sim.set_envs(n_envs=128); sim.initialize()
@@ -16,9 +18,10 @@ for step in range(1000):
 '''
 
 
-def run_listing(path, poses, grasp, n_envs=128, steps=1000):
-    """The listing with a path, a number of environments and a length; its simulation."""
+def run_listing(path, poses, grasp, n_envs=128, steps=1000, device="auto"):
+    """The listing with a path, a number of environments, a length and a device; its simulation."""
     text = LISTING.replace("path/to/scene.json", str(path)).replace("128", str(n_envs)).replace("1000", str(steps))
+    text = text.replace("RealtimeSim()", f"RealtimeSim({device!r})")
     left, right = poses
     names = {"start_pose_l": left, "start_pose_r": right, "pose_l": left, "pose_r": right, "grasp_l": grasp,
              "grasp_r": grasp}
@@ -27,15 +30,17 @@ def run_listing(path, poses, grasp, n_envs=128, steps=1000):
 
 
 def expect_run(sim, n_envs, steps):
-    assert (sim.status()["steps"] == steps).all() and (sim.status()["lost"] == 0).all(), sim.why_lost()
+    status = flash_sim.to_host(sim.status())
+    assert (status["steps"] == steps).all() and (status["lost"] == 0).all(), sim.why_lost()
     for body in sim.bodies:
-        assert sim.positions(body).shape[0] == n_envs and np.isfinite(sim.positions(body)).all()
+        positions = flash_sim.to_host(sim.positions(body))
+        assert positions.shape[0] == n_envs and np.isfinite(positions).all()
 
 
 APART = ([0, 0, 0.5, 0, 0, 0, 1], [0.5, 0, 0.5, 0, 0, 0, 1])  # above what lies on a table
 
 
-def test_as_it_stands_on_128_environments_of_a_published_scene(tmp_path):
+def test_as_it_stands_on_128_environments_of_a_published_scene(tmp_path, device):
     """Without a schema, in the published format: each hand holds the corner below it."""
     asset = {"mesh": "towel.obj", "element_type": "TRIANGLE",
              "mechanical_props": {"obj_mass": 0.008, "young": 100, "poisson": 0.3, "constitutive": "TRI_COROTATED",
@@ -51,7 +56,8 @@ def test_as_it_stands_on_128_environments_of_a_published_scene(tmp_path):
         "objects": {"towel": "towel.json"}}))
     poses = ([0, 0, 0.0255, 0, 0, 0, 1], [0.2, 0.2, 0.0255, 0, 0, 0, 1])
     grasp = np.arange(128) % 2 == 0
-    sim = run_listing(tmp_path / "published.json", poses, grasp, steps=20)
+    sim = run_listing(tmp_path / "published.json", poses, grasp, steps=20, device=device)
+    assert sim.device.startswith(device)
     expect_run(sim, 128, 20)
     for hand in ("left", "right"):
         assert ((sim.held(hand) > 0) == grasp).all()

@@ -64,6 +64,25 @@ TEST_F(LiveScenes, AHandThatHoldsAllOfASheetCarriesItsWeight) {
   EXPECT_NEAR(row(live.force("hand"), 0)[2], weight, 1e-3 * weight);
 }
 
+// Two sheets apart from each other lie on one table; m g each. A hand on one of them takes its share.
+TEST_F(LiveScenes, ATableBearsAllObjectsButForWhatAHandCarries) {
+  LiveScene live(scene(true, false), 2, 1);
+  live.add_end_effector(hand(), tensor(poses(2, 0.05), {2, 7}));
+  const double weight = 2 * 0.2 * 0.2 * 0.2 * 9.81;
+  drive(live, 0, 10);
+  for (int e = 0; e < 2; ++e) EXPECT_NEAR(row(live.force("table"), e)[2], weight, 1e-3 * weight);
+  drive(live, 10, 30);
+  const std::vector<double> still = poses(2, height(29));
+  live.move_end_effector("hand", {}, tensor(still, {2, 7}));
+  live.step(100);
+  for (int e = 0; e < 2; ++e) {
+    EXPECT_NEAR(row(live.force("table"), e)[2] + row(live.force("hand"), e)[2], weight, 1e-2 * weight);
+    EXPECT_GT(row(live.force("hand"), e)[2], 1e-2 * weight);
+  }
+  EXPECT_EQ(live.device().device, Device::cpu);
+  EXPECT_EQ(live.on_device(live.force("table")).data, live.force("table").data);
+}
+
 TEST_F(LiveScenes, AClosedHandTakesNothingUntilItHasOpened) {
   LiveScene live(scene(false, false), 1, 1);
   live.add_end_effector(hand(), tensor(poses(1, 0.05), {1, 7}));

@@ -68,6 +68,35 @@ TEST_F(DeviceLiveScenes, AHandThatIsAddedLiftsAsOnTheProcessor) {
     EXPECT_LE(farthest_apart(row(device.force("hand"), e), row(processor.force("hand"), e)), 1e-2 * weight);
 }
 
+TEST_F(DeviceLiveScenes, ViewsStayWhenAHandIsAddedAndGoWithTheSteps) {
+  SKIP_WITHOUT_DEVICE();
+  LiveScene live(scene(true, false), 2, 1, on_cuda);
+  EXPECT_EQ(live.device().cuda_devices, std::vector{0});
+  const Tensor x = live.positions("b"), table = live.on_device(live.force("table")),
+               status = live.on_device(live.status());
+  live.add_end_effector(hand(), tensor(poses(2, 0.05), {2, 7}));
+  const Tensor of_hand = live.on_device(live.force("hand"));
+  EXPECT_EQ(live.positions("b").data, x.data);
+  drive(live, 0, 20);
+  live.reset(std::vector{1});
+  const auto expect_shown = [](const Tensor& there, const Tensor& here) {
+    EXPECT_EQ(there.device, Device::cuda);
+    std::vector<double> all;
+    for (int e = 0; e < 2; ++e) {
+      const std::vector<double> own = row(here, e);
+      all.insert(all.end(), own.begin(), own.end());
+    }
+    EXPECT_EQ(cuda::numbers_of(there), all);
+    EXPECT_NE(all, std::vector<double>(all.size()));
+  };
+  expect_shown(table, live.force("table"));
+  expect_shown(of_hand, live.force("hand"));
+  expect_shown(status, live.status());
+  EXPECT_EQ(cuda::numbers_of(status)[0], 20);
+  EXPECT_EQ(live.on_device(live.status()).data, status.data);
+  EXPECT_EQ(cuda::numbers_of(x), cuda::numbers_of(live.positions("b")));
+}
+
 // Free fall without a table in reach: v = g t exactly, each environment its own g.
 TEST_F(DeviceLiveScenes, GravityIsThatOfEachEnvironment) {
   SKIP_WITHOUT_DEVICE();

@@ -1,0 +1,44 @@
+#pragma once
+#include <cstddef>
+#include <memory>
+#include <span>
+
+namespace flash::sim {
+
+/// Copies on a CUDA device of numbers of the host, which stay where they are. Throws a DeviceError where the
+/// device is lost, OutOfDeviceMemory where its memory does not suffice.
+class DeviceCopies {
+ public:
+  explicit DeviceCopies(int cuda_device);
+  ~DeviceCopies();
+
+  int cuda_device() const;
+
+  /// The copy of numbers, made when it is first asked for. It stays where it is.
+  const double* of(std::span<const double> numbers);
+
+  /// Brings all of them to what the numbers are now. What others have queued on the device's default stream
+  /// comes before.
+  void renew();
+
+ private:
+  struct Storage;
+  std::unique_ptr<Storage> storage_;
+};
+
+/// Brings bytes from the memory of a CUDA device, once what others have queued on its default stream has
+/// ended.
+void read_device(int cuda_device, const void* from, std::size_t bytes, void* to);
+
+/// The CUDA device that this thread works with is the same afterwards: other libraries look at it too.
+class KeptCudaDevice {
+ public:
+  KeptCudaDevice();
+  ~KeptCudaDevice();
+  KeptCudaDevice(const KeptCudaDevice&) = delete;
+
+ private:
+  int device_ = -1;
+};
+
+}  // namespace flash::sim
