@@ -137,8 +137,8 @@ std::vector<std::string> input_files(const std::vector<std::string>& values) {
 }
 
 std::string input_there(const std::string& path) {
-  if (!is_file(path)) return {};
   const fs::path whole = whole_path(path);
+  if (!is_file(whole)) return {};
   for (fs::path folder = whole.parent_path();; folder = folder.parent_path()) {
     if (is_file(folder / "recording.json"))
       for (const std::string& file : input_files({(folder / "recording.json").string()}))
@@ -148,7 +148,7 @@ std::string input_there(const std::string& path) {
       return "is part of the search in " + folder.string();
     if (folder == folder.parent_path()) break;
   }
-  return document_there(path);
+  return document_there(whole.string());
 }
 
 std::string whole_path(const std::string& path) {

@@ -17,7 +17,7 @@ using Identity = std::pair<dev_t, ino_t>;
 /// What a file is, by whatever path it is reached; none where nothing is there.
 std::optional<Identity> identity_of(const std::string& path) {
   struct stat status = {};
-  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  if (::stat(whole_path(path).c_str(), &status) != 0) return std::nullopt;
   return Identity(status.st_dev, status.st_ino);
 }
 

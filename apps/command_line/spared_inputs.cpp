@@ -68,7 +68,7 @@ void collect(const CLI::App& app, CommandLine& line) {
 std::vector<std::string> folders_of(const std::string& out) {
   std::vector<std::string> folders = {whole_path(out)};
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(out, error))
+  for (const auto& entry : fs::directory_iterator(whole_path(out), error))
     if (entry.is_symlink(error) && is_folder(entry.path()))
       folders.push_back(whole_path(entry.path().string()));
   return folders;
@@ -95,11 +95,12 @@ void expect_spared_inputs(const CLI::App& app) {
   collect(app, line);
   const Replaced replaced = line.writes_asset ? Replaced::assets : Replaced::results;
   expect_own_files(line.outputs, {}, Replaced::anything);
-  std::erase_if(line.outputs, [](const std::string& path) { return !is_file(path); });
-  if (line.outputs.empty() && !is_folder(line.out)) return;  // nothing is there to be written over
+  std::erase_if(line.outputs, [](const std::string& path) { return !is_file(whole_path(path)); });
+  if (line.outputs.empty() && !is_folder(whole_path(line.out)))
+    return;  // nothing is there to be written over
   const std::vector<std::string> read = input_files(line.inputs);
   expect_own_files(line.outputs, read, replaced);
-  if (is_folder(line.out)) check_folder(line.out, read, line.resumes);
+  if (is_folder(whole_path(line.out))) check_folder(line.out, read, line.resumes);
 }
 
 }  // namespace flash

@@ -23,12 +23,15 @@ InputError refusal(const std::string& path, const std::string& reason) {
   return InputError(path + ": cannot be written: " + reason);
 }
 
-fs::file_status status_of(const fs::path& place, const std::string& path) {
+/// Of what will stand there when folders on the way are made: "missing/../lift" is lift.
+fs::file_status status_of(const fs::path& named, const std::string& path) {
   std::error_code code;
+  const fs::path whole = fs::weakly_canonical(fs::absolute(named, code), code);
+  const fs::path place = code ? named : whole;
   const fs::file_status status = fs::status(place, code);
   if (!fs::status_known(status)) throw refusal(path, code.message());
   if (!fs::exists(status) && fs::is_symlink(fs::symlink_status(place, code)))
-    throw refusal(path, place.string() + " is a link to a place that is not there");
+    throw refusal(path, named.string() + " is a link to a place that is not there");
   return status;
 }
 
