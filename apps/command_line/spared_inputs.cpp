@@ -11,6 +11,7 @@
 #include "apps/command_line/input_files.h"
 #include "apps/command_line/result_files.h"
 #include "data/files/error.h"
+#include "data/files/folder_lock.h"
 #include "data/files/text.h"
 
 namespace flash {
@@ -98,6 +99,7 @@ void expect_spared_inputs(const CLI::App& app) {
   std::erase_if(line.outputs, [](const std::string& path) { return !is_file(whole_path(path)); });
   if (line.outputs.empty() && !is_folder(whole_path(line.out)))
     return;  // nothing is there to be written over
+  if (is_folder(whole_path(line.out))) data::expect_not_held(line.out);
   const std::vector<std::string> read = input_files(line.inputs);
   expect_own_files(line.outputs, read, replaced);
   if (is_folder(whole_path(line.out))) check_folder(line.out, read, line.resumes);
