@@ -36,9 +36,16 @@ fs::file_status status_of(const fs::path& named, const std::string& path) {
 }
 
 /// Makes a file in `folder`, or in the folder that it would be made in, and takes it away: permissions alone
-/// do not tell, as a file system may be read-only or take no files at all.
+/// do not tell, as a file system may be read-only or take no files at all. It has no name where the file
+/// system has such files: then a kill leaves none.
 void check_place(fs::path folder, const std::string& path) {
   while (!fs::exists(status_of(folder, path))) folder = folder.parent_path();
+#ifdef O_TMPFILE
+  if (const int nameless = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666); nameless >= 0) {
+    ::close(nameless);
+    return;
+  }
+#endif
   const std::string probe = (folder / ('.' + std::to_string(::getpid()) + "-0.tmp")).string();
   const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor < 0) throw refusal(path, std::strerror(errno));
