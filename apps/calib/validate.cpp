@@ -18,6 +18,7 @@
 #include "data/camera/posed_lens.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
+#include "data/files/folder_lock.h"
 #include "data/files/json_reader.h"
 #include "data/files/writable.h"
 
@@ -181,6 +182,7 @@ int run_validate(const CLI::App& verb, ValidateOptions options) {
   const data::LensChoice choice = data::parse_lens_choice(options.lens, own);
   expect_no_camera({.own = own}, options.dataset.camera);
   if (!own.empty()) options.dataset.camera = own;
+  data::expect_not_held(options.out);
   if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);

@@ -2,11 +2,11 @@
 
 #include <sys/stat.h>
 
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "apps/command_line/input_files.h"
 #include "data/files/error.h"
 
 namespace flash {
@@ -17,21 +17,14 @@ using Identity = std::pair<dev_t, ino_t>;
 /// What a file is, by whatever path it is reached; none where nothing is there.
 std::optional<Identity> identity_of(const std::string& path) {
   struct stat status = {};
-  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  if (::stat(whole_path(path).c_str(), &status) != 0) return std::nullopt;
   return Identity(status.st_dev, status.st_ino);
-}
-
-/// Of a file that may not be there yet.
-std::string whole_path(const std::string& path) {
-  std::error_code error;
-  const std::filesystem::path whole =
-      std::filesystem::weakly_canonical(std::filesystem::absolute(path, error), error);
-  return error ? path : whole.string();
 }
 
 }  // namespace
 
-void expect_own_files(const std::vector<std::string>& written, const std::vector<std::string>& read) {
+void expect_own_files(const std::vector<std::string>& written, const std::vector<std::string>& read,
+                      Replaced replaced) {
   std::map<Identity, std::string> inputs;
   for (const std::string& path : read)
     if (const std::optional<Identity> identity = identity_of(path)) inputs.emplace(*identity, path);
@@ -48,6 +41,10 @@ void expect_own_files(const std::vector<std::string>& written, const std::vector
       throw data::InputError(path + ": is read by this run" +
                              (input->second == path ? "" : ", as " + input->second) +
                              "; expected another file for the result");
+    if (replaced == Replaced::anything) continue;
+    const std::string there = input_there(path);
+    if (!there.empty() && !(replaced == Replaced::assets && there == kIsAsset))
+      throw data::InputError(path + ": " + there + ", expected another file for the result");
   }
 }
 

@@ -18,6 +18,7 @@
 #include "data/files/text.h"
 #include "data/files/writable.h"
 #include "data/mesh/mesh_io.h"
+#include "data/mesh/procedural_mesh.h"
 #include "data/meshing/flatten.h"
 #include "data/meshing/fused_frames.h"
 #include "data/meshing/scanned_surface.h"
@@ -205,19 +206,33 @@ int mesh_solid(const MeshOptions& options) {
   return exit_done;
 }
 
-/// The mesh as it is, but for vertices in one place, which become one.
+/// Of a file, or made on the spot.
+data::Geometry given_mesh(const std::string& name) {
+  if (data::is_tet_mesh_spec(name)) {
+    const data::TetMesh solid = data::parse_tet_mesh_spec(name, "mesh", "");
+    return {.points = solid.vertices, .triangles = {}, .tetrahedra = solid.tetrahedra};
+  }
+  if (!data::is_mesh_spec(name)) return data::load_geometry(name);
+  const data::TriangleMesh sheet = data::parse_mesh_spec(name, "mesh", "");
+  return {.points = sheet.vertices, .triangles = sheet.triangles, .tetrahedra = {}};
+}
+
+/// The mesh as it is, but for vertices of a file in one place, which become one.
 int mesh_welded(const MeshOptions& options) {
-  const data::Geometry given = data::load_geometry(options.input);
+  const data::Geometry given = given_mesh(options.input);
+  const bool is_made = data::is_made_on_the_spot(options.input);
   const bool is_solid = given.tetrahedra.rows() > 0;
   std::string text;
   Eigen::Index vertices = 0;
   if (is_solid) {
-    data::TetMesh solid = data::load_tet_mesh(options.input, true);
+    data::TetMesh solid =
+        is_made ? data::TetMesh{given.points, given.tetrahedra} : data::load_tet_mesh(options.input, true);
     solid.vertices *= options.scale;
     vertices = solid.vertices.rows();
     text = data::format_tet_mesh(solid, options.out);
   } else {
-    data::TriangleMesh sheet = data::load_triangle_mesh(options.input, true);
+    data::TriangleMesh sheet = is_made ? data::TriangleMesh{given.points, given.triangles}
+                                       : data::load_triangle_mesh(options.input, true);
     sheet.vertices *= options.scale;
     vertices = sheet.vertices.rows();
     text = data::format_triangle_mesh(sheet, options.out);
@@ -257,10 +272,21 @@ void read_lens(MeshOptions& options) {
     throw data::InputError("--poses: are for depth frames, which need --intrinsics");
 }
 
-int mesh(MeshOptions options) {
+/// A mesh that is made on the spot is written as its name says.
+void expect_no_scan_option(const CLI::App& verb, const MeshOptions& options) {
+  for (const char* name : {"--flat", "--edge", "--smoothing", "--holes", "--points", "--tets", "--weld",
+                           "--intrinsics", "--lens", "--poses", "--extrinsics", "--masks", "--depth-scale"})
+    if (verb.count(name) > 0)
+      throw data::InputError(std::string(name) + ": is of scans, found " + options.input +
+                             ", which is made as its name says");
+}
+
+int mesh(const CLI::App& verb, MeshOptions options) {
+  const bool is_made = data::is_made_on_the_spot(options.input);
+  if (is_made) expect_no_scan_option(verb, options);
   read_lens(options);
   data::check_file_free(options.out, options.force);
-  if (options.weld) return mesh_welded(options);
+  if (options.weld || is_made) return mesh_welded(options);
   if (options.tets) {
     data::format_tet_mesh({}, options.out);  // refuses the ending before the work
     return mesh_solid(options);
@@ -288,9 +314,12 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       "  flash-sim mesh scan.ply --edge 0.01 -o cloth.obj --flat cloth_flat.obj\n"
       "  flash-sim mesh depth --intrinsics camera_info.yaml --poses camera.tum -o cloth.obj\n"
       "  flash-sim mesh solid.stl --scale 0.001 --tets --edge 0.005 -o solid.vtk\n"
-      "  flash-sim mesh part.msh --weld -o part.vtk");
-  verb.add_option("scan", options->input,
-                  "Cloud or mesh (.ply .obj .stl .vtk .msh .pcd), or a folder of .ply, .pcd or depth .png")
+      "  flash-sim mesh part.msh --weld -o part.vtk\n"
+      "  flash-sim mesh sheet:0.4x0.3:0.01 -o towel.obj");
+  verb.add_option(
+          "scan", options->input,
+          "Cloud or mesh (.ply .obj .stl .vtk .msh .pcd), or a folder of .ply, .pcd or depth .png; a name as "
+          "sheet:0.4x0.3:0.01 or box:0.1x0.03x0.03:0.01 is written as it says")
       ->required();
   verb.add_option("-o,--out", options->out, "Mesh to write (.obj .ply .vtk; of tetrahedra .vtk .tet)")
       ->required();
@@ -347,9 +376,9 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       verb, options->despite_doubts,
       "Write a flat shape with triangles turned over; take a calibration that said it cannot be "
       "used");
-  verb.callback([&action, options] {
+  verb.callback([&action, &verb, options] {
     options->frames.folder = options->input;
-    action = [options] { return mesh(*options); };
+    action = [&verb, options] { return mesh(verb, *options); };
   });
 }
 

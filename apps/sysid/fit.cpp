@@ -6,6 +6,7 @@
 #include "apps/command_line/option_checks.h"
 #include "apps/sysid/options.h"
 #include "apps/sysid/search.h"
+#include "apps/sysid/search_inputs.h"
 #include "apps/sysid/verbs.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
@@ -95,7 +96,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recordings.front());
   for (const data::Recording& recording : recordings) check_kind(asset, recording);
-  check_options(options.replay, asset);
+  check_options(options.replay, asset, recordings);
   sysid::FitStart start = sysid::fit_start(found, options.holds);
   sysid::GridSettings& grid = start.grid;
   grid.score = score_settings(options.replay);
@@ -104,11 +105,13 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   replay.element_order = asset.element_order;
   place_simulation(options.common, asset, replay);
-  if (replay.mesh.empty()) replay.mesh = sysid::mesh_of(found.summary);
+  const bool own_mesh = replay.mesh.empty();
+  if (own_mesh) replay.mesh = sysid::mesh_of(found.summary);
   std::vector<sysid::Replay> replays;
   std::vector<std::string> names;
   for (const data::Recording& recording : recordings) {
     replays.push_back(sysid::make_replay(recording, replay));
+    if (own_mesh) check_size(replays.back(), recording, options.start);
     names.push_back(recording.name);
   }
   if (replay.self_contact) sysid::on_half_the_cell(replays);  // refused before anything is simulated

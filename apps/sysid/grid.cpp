@@ -110,7 +110,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   if (goes_on) order_as(sysid::load_grid_file(grid_file).recordings, recordings);
   const data::Asset asset = load_asset_for(options.asset, recordings.front());
   for (const data::Recording& recording : recordings) check_kind(asset, recording);
-  check_options(options.replay, asset);
+  check_options(options.replay, asset, recordings);
   const int threads = thread_count(options.common);
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, threads);
   simulated.element_order = asset.element_order;

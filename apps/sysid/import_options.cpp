@@ -58,23 +58,11 @@ void parse_range(const std::string& range, const char* option, int axis, data::C
 }
 
 data::TriangleMesh load_mesh(const std::string& spec) {
-  const data::TriangleMesh mesh = data::is_mesh_spec(spec) ? data::parse_mesh_spec(spec, "import", "--mesh")
-                                                           : data::load_triangle_mesh(spec);
+  const data::TriangleMesh mesh =
+      data::is_mesh_spec(spec) ? data::parse_mesh_spec(spec, "--mesh", "") : data::load_triangle_mesh(spec);
   const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff();
   if (size.norm() > kLargestSheet) throw option_error("mesh", spec, "metres (millimetres read as metres?)");
   return mesh;
-}
-
-/// Of a sheet that is made on the spot.
-void check_cell(const std::string& spec, const data::TriangleMesh& mesh) {
-  const std::vector<std::string_view> parts = data::split(spec, ":");
-  if (!data::is_mesh_spec(spec) || parts.size() < 3) return;
-  const double shorter =
-      (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).head<2>().minCoeff();
-  if (data::parse_number(parts[2]).value_or(0) > shorter)
-    throw option_error(
-        "mesh", spec,
-        "cells of at most the shorter side of the sheet, " + data::format_short(shorter) + " m");
 }
 
 data::Trajectory load_gripper(const std::string& path) {
@@ -202,7 +190,6 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
   if (options.mesh.empty()) throw data::InputError("import: expected --mesh, as sheet:0.3x0.24:0.01");
   settings.mesh_spec = options.mesh;
   settings.mesh = load_mesh(options.mesh);
-  check_cell(options.mesh, settings.mesh);
   settings.grasp = parse_grasp(options.grasp);
   settings.grasp.within = options.within.value_or(data::Selection().within);
   settings.crop = parse_crop(options.crop);

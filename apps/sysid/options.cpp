@@ -91,6 +91,31 @@ data::Asset with_fixed(data::Asset asset, const std::vector<sysid::Axis>& fixed)
   return asset;
 }
 
+bool observes(const data::RecordedKeyframe& keyframe, const std::string& term) {
+  return (term == "cloud" && !(keyframe.cloud + keyframe.depth).empty()) ||
+         (term == "contour" && !keyframe.contour.empty()) ||
+         (term == "markers" && (!keyframe.markers.empty() || keyframe.sample >= 0)) ||
+         (term == "force" && keyframe.force);
+}
+
+/// Throws InputError where an option is of what no recording has.
+void check_observed(const ReplayOptions& options, const std::vector<data::Recording>& recordings) {
+  const auto expect = [&](const std::string& option, const std::string& term) {
+    for (const data::Recording& recording : recordings)
+      for (const data::RecordedKeyframe& keyframe : recording.keyframes)
+        if (observes(keyframe, term)) return;
+    throw data::InputError(option + ": found no " + term + " in a keyframe of " + recordings.front().source +
+                           (recordings.size() > 1 ? " and the other recordings" : "") +
+                           ", expected it of what was observed");
+  };
+  for (const std::string& sigma : options.sigmas)
+    expect("--sigma " + sigma, sigma.substr(0, sigma.find('=')));
+  if (options.two_sided) expect("--two-sided", "cloud");
+  if (!options.shared.empty() && recordings.size() < 2)
+    throw data::InputError("--share " + options.shared.front() +
+                           ": found one recording, expected two or more");
+}
+
 }  // namespace
 
 void add_common_options(CLI::App& verb, CommonOptions& options) {
@@ -404,7 +429,9 @@ void check_kind(const data::Asset& asset, const data::Recording& recording) {
                               recording.source + " is a " + (solid ? "sheet" : "solid"));
 }
 
-void check_options(const ReplayOptions& options, const data::Asset& asset) {
+void check_options(const ReplayOptions& options, const data::Asset& asset,
+                   const std::vector<data::Recording>& recordings) {
+  check_observed(options, recordings);
   if (asset.element_type == data::ElementType::tetrahedron && options.clamp_slopes)
     throw data::InputError(
         "--clamp-slopes: found a solid, expected a sheet: a solid has no slopes of its own");

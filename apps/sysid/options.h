@@ -107,8 +107,10 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
 /// round.
 void check_kind(const data::Asset& asset, const data::Recording& recording);
 
-/// Throws InputError where an option is of sheets alone and the object is a solid.
-void check_options(const ReplayOptions& options, const data::Asset& asset);
+/// Throws InputError where an option is of sheets alone and the object is a solid, or of what no recording
+/// has: the noise of forces where none was measured, an error in common with no other recording.
+void check_options(const ReplayOptions& options, const data::Asset& asset,
+                   const std::vector<data::Recording>& recordings);
 
 /// The asset's material; what was understood, with `fixed` in place of the asset's values, is appended to
 /// `notices`.

@@ -10,6 +10,7 @@
 #include "apps/command_line/command_line.h"
 #include "apps/command_line/option_checks.h"
 #include "apps/sysid/options.h"
+#include "apps/sysid/search_inputs.h"
 #include "apps/sysid/verbs.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
@@ -19,6 +20,7 @@
 #include "sysid/design/rank_experiments.h"
 #include "sysid/design/usual_ranges.h"
 #include "sysid/design/virtual_experiment.h"
+#include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_warnings.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/parameter_label.h"
@@ -112,6 +114,20 @@ void check_options(const CLI::App& verb, const PlanOptions& options) {
     if (verb.count(name) > 0) throw data::InputError(name + beside);
 }
 
+// What a search left to be known is of its object.
+void check_cloth(const sysid::SearchFolder& found, const PlanOptions& options,
+                 const std::vector<data::Recording>& recordings, const sysid::ReplaySettings& settings,
+                 const sysid::GridSettings& grid) {
+  sysid::ReplaySettings of_search = settings;
+  of_search.mesh = sysid::mesh_of(found.summary);
+  for (const data::Recording& recording : recordings)
+    check_size(sysid::make_replay(recording, of_search), recording, options.run);
+  if (options.asset.empty()) return;
+  const std::vector<sysid::Replay> replays = {sysid::make_replay(recordings.front(), settings)};
+  for (const std::string& line : unlike_the_asset_of(options.run, sysid::fingerprint(replays, grid)))
+    warn("--asset: " + line);
+}
+
 int run_plan(const CLI::App& verb, const PlanOptions& options) {
   stop_on_signals();
   check_options(verb, options);
@@ -126,6 +142,7 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   const data::Asset asset = load_asset_for(
       options.asset.empty() && found ? found->summary.asset : options.asset, recordings.front());
   check_kind(asset, recordings.front());
+  check_options(options.replay, asset, recordings);
   const sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   if (!replay.mesh.empty()) recordings.front() = sysid::make_replay(recordings.front(), replay).recording;
   std::vector<std::string> notices;
@@ -151,6 +168,7 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     sysid::start_plan(*found, settings);
   }
   data::check_file_free(options.out, options.common.force);
+  if (found) check_cloth(*found, options, recordings, replay, settings.grid);
   // Refused before anything is simulated.
   sysid::steps_in(sysid::longest_virtual_experiment, options.replay.time_step);
 

@@ -9,6 +9,7 @@
 #include "apps/command_line/command_line.h"
 #include "apps/command_line/option_checks.h"
 #include "apps/sysid/options.h"
+#include "apps/sysid/search_inputs.h"
 #include "apps/sysid/verbs.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
@@ -115,19 +116,6 @@ void warn_of_other_settings(const sysid::Summary& summary, const ReplayOptions& 
   compare("tolerance", "--tolerance", options.tolerance);
 }
 
-// Throws InputError where the recording is of a sheet of another size than the search's.
-void check_size(const sysid::Replay& replay, const data::Recording& recording, const std::string& run) {
-  const auto extent = [](const data::Points& vertices) {
-    return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
-  };
-  const double searched = extent(replay.recording.mesh.vertices), here = extent(recording.mesh.vertices);
-  if (std::abs(searched - here) > 0.02 * here)
-    throw data::input_error(recording.source, "object.mesh",
-                            "found an object " + data::format_short(here) + " m across, that of " + run +
-                                " is " + data::format_short(searched) +
-                                " m: give --mesh where both are of the same material");
-}
-
 nlohmann::ordered_json prediction_json(const sysid::Prediction& prediction, const PredictOptions& options,
                                        const data::Recording& recording) {
   nlohmann::ordered_json json;
@@ -174,7 +162,7 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recording);
   check_kind(asset, recording);
-  check_options(options.replay, asset);
+  check_options(options.replay, asset, {recording});
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
   simulated.element_order = asset.element_order;
   place_simulation(options.common, asset, simulated);

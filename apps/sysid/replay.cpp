@@ -137,7 +137,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   warn_of_doubts(recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
   check_kind(asset, recording);
-  check_options(options.replay, asset);
+  check_options(options.replay, asset, {recording});
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
   check_device(options.common, simulated);
   const sim::DeviceChoice device =

@@ -206,9 +206,10 @@ int run_synth(SynthOptions options) {
   options.synth.device = sim::choose_device(options.common.device == "auto" ? "cpu" : options.common.device);
   const data::Asset asset = data::load_asset(options.asset);
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
-  const data::TriangleMesh mesh = options.mesh.empty()            ? data::load_rest_mesh(asset)
-                                  : data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
-                                                                  : data::load_triangle_mesh(mesh_spec);
+  const data::TriangleMesh mesh = options.mesh.empty() ? data::load_rest_mesh(asset)
+                                  : data::is_mesh_spec(mesh_spec)
+                                      ? data::parse_mesh_spec(mesh_spec, "--mesh", "")
+                                      : data::load_triangle_mesh(mesh_spec);
   std::vector<std::string> notices;
   const std::vector<sysid::Axis> axes = parse_values(options.holds);
   const sysid::MaterialBase base = material_base(asset, sim::make_sheet(mesh), notices, axes);

@@ -62,6 +62,9 @@ void expect_convention(Setup setup, const std::vector<Observation>& observations
   const std::optional<Finding> finding =
       check_convention(setup, observations, symmetries, stated, settings.angles, settings.convention);
   if (finding) throw data::InputError(finding->sentence);
+  if (const std::optional<Finding> pairing =
+          check_pairing(setup, observations, symmetries, stated, settings.convention))
+    throw data::InputError(pairing->sentence);
   const bool hopeless = !(stated.found && stated.score < settings.hopeless);
   const std::optional<Finding> sized =
       check_size(setup, observations, symmetries, stated, settings.convention);

@@ -41,6 +41,14 @@ bool same_poses(const Poses& a, const Poses& b) {
   return true;
 }
 
+Reading as_it_is_stated(Setup setup, const std::vector<Observation>& observations) {
+  Reading reading{.sentence = {}, .setup = setup, .T_base_gripper = {}, .known = {}};
+  for (const Observation& observation : observations)
+    reading.T_base_gripper.push_back(observation.T_base_gripper);
+  reading.known.assign(observations.size(), true);
+  return reading;
+}
+
 void add_pairings(const Reading& as_stated, std::vector<Reading>& readings) {
   const auto count = static_cast<int>(as_stated.T_base_gripper.size());
   for (const int shift : {-1, 1, -2, 2}) {
@@ -195,10 +203,7 @@ double size_of_target(const Reading& reading, const std::vector<Observation>& ob
 
 std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
                                           const std::vector<Eigen::Vector3d>& angles) {
-  Reading as_stated{.sentence = {}, .setup = setup, .T_base_gripper = {}, .known = {}};
-  for (const Observation& observation : observations)
-    as_stated.T_base_gripper.push_back(observation.T_base_gripper);
-  as_stated.known.assign(observations.size(), true);
+  const Reading as_stated = as_it_is_stated(setup, observations);
   const auto with = [&](std::string sentence, Poses poses) {
     Reading reading = as_stated;
     reading.sentence = std::move(sentence);
@@ -270,14 +275,31 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
   return best;
 }
 
+std::optional<Finding> check_pairing(Setup setup, const std::vector<Observation>& observations,
+                                     const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                     const ConventionSettings& settings) {
+  if (!stated.found) return std::nullopt;
+  const Reading as_stated = as_it_is_stated(setup, observations);
+  std::vector<Reading> readings;
+  add_pairings(as_stated, readings);
+  std::optional<Finding> best;
+  for (const Reading& reading : readings) {
+    const RobustSeed seed = robust_seed_of(reading, observations, symmetries, settings.robust_seed);
+    if (!seed.found || !(settings.paired * seed.score < stated.score)) continue;
+    if (best && !(seed.score < best->found.score)) continue;
+    best = Finding{reading.sentence, stated, seed};
+  }
+  if (best)
+    best->sentence +=
+        ": so the chain closes to " + closing_text(best->found) + ", as stated to " + closing_text(stated);
+  return best;
+}
+
 std::optional<Finding> check_size(Setup setup, const std::vector<Observation>& observations,
                                   const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
                                   const ConventionSettings& settings) {
   if (!stated.found || stated.score < settings.suspicious) return std::nullopt;
-  Reading reading{.sentence = {}, .setup = setup, .T_base_gripper = {}, .known = {}};
-  for (const Observation& observation : observations)
-    reading.T_base_gripper.push_back(observation.T_base_gripper);
-  reading.known.assign(observations.size(), true);
+  Reading reading = as_it_is_stated(setup, observations);
   // A robot in units of the target: views that are wrong have less of a say each time.
   double size = 1;
   RobustSeed found = stated;

@@ -31,6 +31,7 @@ struct ConventionSettings {
   double suspicious = 0.035;  ///< closing error of the majority, rotation [rad] and translation over distance
   double better = 4;          ///< how many times better another reading has to close
   double runner_up = 2;       ///< and how many times better than the next reading
+  double paired = 2;          ///< how many times better another pairing has to close
   double plausible = 0.07;    ///< and to how little at most, as `suspicious`
 };
 
@@ -46,6 +47,14 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
                                         const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
                                         const std::vector<Eigen::Vector3d>& angles = {},
                                         const ConventionSettings& settings = {});
+
+/// Whether images and poses are paired off by one or two, or in reverse, where the stated reading closes well
+/// enough for check_convention: a robot that is swept regularly moves much alike from view to view, so that a
+/// shift is nearly consistent, and the answer far off. Empty where no such reading closes `paired` times
+/// better.
+std::optional<Finding> check_pairing(Setup setup, const std::vector<Observation>& observations,
+                                     const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                     const ConventionSettings& settings = {});
 
 /// Whether the stated reading closes with a target of another size, which is estimated. Empty as that of
 /// check_convention.

@@ -14,14 +14,20 @@
 namespace flash::data {
 namespace {
 
+constexpr double kFarthest = 100;  // no depth camera of a cell sees farther [m]
+
+std::vector<double> above_zero(const std::vector<double>& values) {
+  std::vector<double> seen;
+  for (const double value : values)
+    if (value > 0) seen.push_back(value);
+  return seen;
+}
+
 /// Real numbers as metres.
 DepthMap metres(int width, int height, std::vector<double> values, const std::string& path) {
-  constexpr double kFarthest = 100;  // no depth camera of a cell sees farther [m]
-  std::vector<double> seen;
-  for (double& value : values) {
+  for (double& value : values)
     if (!(value > 0) || !std::isfinite(value)) value = 0;
-    if (value > 0) seen.push_back(value);
-  }
+  const std::vector<double> seen = above_zero(values);
   if (!seen.empty() && median(seen) > kFarthest)
     throw InputError(path + ": found depths of " + format_short(median(seen)) +
                      " as real numbers, expected metres: are these millimetres?");
@@ -33,19 +39,29 @@ DepthMap counted(int width, int height, std::vector<double> counts, double scale
   return {width, height, std::move(counts)};
 }
 
+DepthMap counted(int width, int height, std::vector<double> counts, double scale, const std::string& path) {
+  const std::vector<double> seen = above_zero(counts);
+  if (!seen.empty() && scale * median(seen) > kFarthest)
+    throw InputError(
+        path + ": found depths of " + format_short(scale * median(seen)) + " m at " + format_short(scale) +
+        " m a count, expected a depth scale of 0.001 where counts are millimetres, which makes " +
+        format_short(0.001 * median(seen)) + " m of them");
+  return counted(width, height, std::move(counts), scale);
+}
+
 DepthMap load_numpy(const std::string& path, double scale) {
   NumpyArray array = load_npy(path);
   if (array.shape.size() != 2 || std::max(array.shape[0], array.shape[1]) > 100'000)
     throw InputError(path + ": found " + std::to_string(array.shape.size()) +
                      " dimensions, expected two, height and width");
   const int height = static_cast<int>(array.shape[0]), width = static_cast<int>(array.shape[1]);
-  return array.whole ? counted(width, height, std::move(array.values), scale)
+  return array.whole ? counted(width, height, std::move(array.values), scale, path)
                      : metres(width, height, std::move(array.values), path);
 }
 
 DepthMap load_tiff(const std::string& path, double scale) {
   GreyTiff tiff = read_tiff(path);
-  return tiff.whole ? counted(tiff.width, tiff.height, std::move(tiff.values), scale)
+  return tiff.whole ? counted(tiff.width, tiff.height, std::move(tiff.values), scale, path)
                     : metres(tiff.width, tiff.height, std::move(tiff.values), path);
 }
 
@@ -60,13 +76,14 @@ DepthMap load_depth(const std::string& path, double scale) {
   const std::string extension = lower_extension(path);
   if (extension == ".npy") return load_numpy(path, scale);
   if (extension == ".tif" || extension == ".tiff") return load_tiff(path, scale);
-  return in_metres(load_depth_image(path), scale);
+  const DepthImage counts = load_depth_image(path);
+  return counted(counts.width, counts.height, {counts.pixels.begin(), counts.pixels.end()}, scale, path);
 }
 
 CameraIntrinsics load_depth_lens(const std::string& path, const std::string& depth) {
   CameraIntrinsics lens = load_intrinsics(path);
   if (lens.width > 0 && lens.height > 0) return lens;
-  const DepthMap picture = load_depth(depth, 1);
+  const DepthMap picture = load_depth(depth, 0.0);  // of which the size alone is asked
   lens.width = picture.width;
   lens.height = picture.height;
   return lens;

@@ -14,8 +14,8 @@ const std::vector<std::string>& depth_endings();
 
 /// 16-bit grey PNG; .npy of two dimensions; TIFF of one channel (.tif, .tiff). Whole numbers are counts of
 /// `scale` metres; real numbers are metres, and nothing was measured where they are not finite or not above
-/// 0. Throws InputError naming the file where it is anything else, and of real numbers beyond what any depth
-/// camera sees, which are millimetres.
+/// 0. Throws InputError naming the file where it is anything else, and where depths are beyond what any depth
+/// camera sees: of real numbers, which are millimetres, and of counts, whose scale is another.
 DepthMap load_depth(const std::string& path, double scale);
 
 /// load_intrinsics, with the size of a picture of depth where the file says none.

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "data/camera/camchain.h"
 #include "data/files/error.h"
@@ -45,15 +46,23 @@ class NamedValues {
  public:
   explicit NamedValues(const std::string& path) : path_(path) {
     if (lower_extension(path) == ".npz")
-      for (const auto& [name, array] : load_npz(path)) numbers_.emplace(plain(name), array.values);
+      for (const auto& [name, array] : load_npz(path)) {
+        numbers_.emplace(plain(name), array.values);
+        const bool has_elements = std::count(array.shape.begin(), array.shape.end(), 0U) == 0;
+        if (array.values.empty() && has_elements)
+          without_numbers_.emplace(plain(name), std::pair(name, array));
+      }
     else
       add(load_yaml(path));  // JSON is YAML
   }
 
   std::vector<double> first(Names names) const {
     for (const char* name : names)
-      if (const auto found = numbers_.find(name); found != numbers_.end() && !found->second.empty())
+      if (const auto found = numbers_.find(name); found != numbers_.end() && !found->second.empty()) {
         return found->second;
+      } else if (const auto other = without_numbers_.find(name); other != without_numbers_.end()) {
+        expect_numbers(other->second.second, path_, other->second.first);
+      }
     return {};
   }
 
@@ -98,6 +107,7 @@ class NamedValues {
   std::string path_;
   std::map<std::string, std::vector<double>> numbers_;
   std::map<std::string, std::string> words_;
+  std::map<std::string, std::pair<std::string, NumpyArray>> without_numbers_;  // with their own names
 };
 
 /// Those of a lens that OpenCV's formula describes; empty where the file names none. Throws InputError of

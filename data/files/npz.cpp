@@ -51,6 +51,35 @@ std::size_t count_of(const std::vector<std::size_t>& shape) {
   return count;
 }
 
+/// What an array without numbers holds.
+std::string content_of(const NumpyArray& array) {
+  if (array.type.empty()) return array.shape.empty() ? "no array of numpy" : "records";
+  const std::string quoted = " (" + array.type + ")";
+  switch (array.type.size() > 1 ? array.type[1] : ' ') {
+    case 'O':
+      return "objects" + quoted;
+    case 'U':
+    case 'S':
+      return "text" + quoted;
+    case 'c':
+      return "complex numbers" + quoted;
+    case 'b':
+      return "truth values" + quoted;
+    case 'M':
+    case 'm':
+      return "times" + quoted;
+    default:
+      break;
+  }
+  if (count_of(array.shape) == 0) return "no element";
+  if (array.type[0] == '>') return "numbers with their bytes the other way round" + quoted;
+  if (array.shape.size() > 2 && array.values.empty() && (array.type == "<f8" || array.type == "<f4"))
+    return "numbers column by column in " + std::to_string(array.shape.size()) + " dimensions" + quoted;
+  return (array.values.empty() ? "numbers of a type that is not read"
+                               : "another number of elements than its shape says") +
+         quoted;
+}
+
 /// Empty of an array that is no list of real numbers.
 NumpyArray array_of(std::string_view npy) {
   if (!npy.starts_with("\x93NUMPY") || npy.size() < 12) return {};
@@ -64,7 +93,8 @@ NumpyArray array_of(std::string_view npy) {
   if (begin + length > npy.size()) return {};
   const std::string_view header = npy.substr(begin, length), bytes = npy.substr(begin + length);
   const std::string_view type = value_of(header, "'descr': '", "'");
-  NumpyArray array{.shape = shape_of(value_of(header, "'shape': (", ")")), .values = {}};
+  NumpyArray array{
+      .shape = shape_of(value_of(header, "'shape': (", ")")), .values = {}, .type = std::string(type)};
   std::vector<double>& values = array.values;
   if (type == "<f8") values = converted<double>(bytes);
   if (type == "<f4") values = converted<float>(bytes);
@@ -72,6 +102,9 @@ NumpyArray array_of(std::string_view npy) {
   if (type == "<i4") values = converted<std::int32_t>(bytes);
   if (type == "<u4") values = converted<std::uint32_t>(bytes);
   if (type == "<u2") values = converted<std::uint16_t>(bytes);
+  if (type == "<i2") values = converted<std::int16_t>(bytes);
+  if (type == "|u1") values = converted<std::uint8_t>(bytes);
+  if (type == "|i1") values = converted<std::int8_t>(bytes);
   array.whole = !type.empty() && type.size() == 3 && type[1] != 'f';
   const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
   if (columns_first && array.shape.size() > 2) values.clear();
@@ -112,10 +145,15 @@ std::map<std::string, NumpyArray> load_npz(const std::string& path) {
   return arrays;
 }
 
+void expect_numbers(const NumpyArray& array, const std::string& path, const std::string& name) {
+  if (!array.values.empty() && array.values.size() == count_of(array.shape)) return;
+  const std::string where = name.empty() ? path : path + ": " + name;
+  throw InputError(where + ": found " + content_of(array) + ", expected real numbers, as numpy.float64");
+}
+
 NumpyArray load_npy(const std::string& path) {
   NumpyArray array = array_of(read_file(path));
-  if (array.values.empty() || array.values.size() != count_of(array.shape))
-    throw InputError(path + ": found no array of real numbers, expected what numpy.save writes of one");
+  expect_numbers(array, path, "");
   return array;
 }
 

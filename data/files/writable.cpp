@@ -23,19 +23,29 @@ InputError refusal(const std::string& path, const std::string& reason) {
   return InputError(path + ": cannot be written: " + reason);
 }
 
-fs::file_status status_of(const fs::path& place, const std::string& path) {
+/// Of what will stand there when folders on the way are made: "missing/../lift" is lift.
+fs::file_status status_of(const fs::path& named, const std::string& path) {
   std::error_code code;
+  const fs::path whole = fs::weakly_canonical(fs::absolute(named, code), code);
+  const fs::path place = code ? named : whole;
   const fs::file_status status = fs::status(place, code);
   if (!fs::status_known(status)) throw refusal(path, code.message());
   if (!fs::exists(status) && fs::is_symlink(fs::symlink_status(place, code)))
-    throw refusal(path, place.string() + " is a link to a place that is not there");
+    throw refusal(path, named.string() + " is a link to a place that is not there");
   return status;
 }
 
 /// Makes a file in `folder`, or in the folder that it would be made in, and takes it away: permissions alone
-/// do not tell, as a file system may be read-only or take no files at all.
+/// do not tell, as a file system may be read-only or take no files at all. It has no name where the file
+/// system has such files: then a kill leaves none.
 void check_place(fs::path folder, const std::string& path) {
   while (!fs::exists(status_of(folder, path))) folder = folder.parent_path();
+#ifdef O_TMPFILE
+  if (const int nameless = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666); nameless >= 0) {
+    ::close(nameless);
+    return;
+  }
+#endif
   const std::string probe = (folder / ('.' + std::to_string(::getpid()) + "-0.tmp")).string();
   const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor < 0) throw refusal(path, std::strerror(errno));

@@ -65,6 +65,12 @@ void even_out(const Triangles& triangles, std::size_t first, std::vector<Eigen::
   for (std::size_t i = first; i < points.size(); ++i) points[i] = sum[i] / count[i];
 }
 
+InputError refused(const std::string& spec, const std::string& source, const std::string& field,
+                   const std::string& expected) {
+  const std::string what = "found \"" + spec + "\", expected " + expected;
+  return field.empty() ? InputError(source + ": " + what) : input_error(source, field, what);
+}
+
 }  // namespace
 
 TriangleMesh rectangle(const RectangleMesh& s) {
@@ -226,9 +232,7 @@ bool is_mesh_spec(const std::string& text) {
 }
 
 TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source, const std::string& field) {
-  const auto fail = [&](const std::string& expected) {
-    return input_error(source, field, "found \"" + spec + "\", expected " + expected);
-  };
+  const auto fail = [&](const std::string& expected) { return refused(spec, source, field, expected); };
   const std::string form =
       "sheet:WIDTHxHEIGHT:CELL[:PATTERN], disc:RADIUS:CELL or tshirt:CELL in metres, such as "
       "sheet:0.4x0.4:0.01";
@@ -254,12 +258,15 @@ TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source,
   if (parts[0] == "disc") {
     if (parts.size() != 3) throw fail(form);
     const double radius = length(parts[1]);
+    if (cell > radius) throw fail("cells of at most the radius, " + format_short(radius) + " m");
     expect_cells(3 * radius * radius / (cell * cell));
     return disc(radius, cell);
   }
   const std::vector<std::string_view> sizes = split(parts[1], "x");
   if (sizes.size() != 2 || parts.size() > 4) throw fail(form);
   const double width = length(sizes[0]), height = length(sizes[1]);
+  if (const double shorter = std::min(width, height); cell > shorter)
+    throw fail("cells of at most the shorter side of the sheet, " + format_short(shorter) + " m");
   const double cells = std::max(1.0, width / cell) * std::max(1.0, height / cell);
   expect_cells(cells);
   if (parts.size() == 4 && parts[3] == "delaunay") {
@@ -288,9 +295,7 @@ bool is_tet_mesh_spec(const std::string& text) { return text.starts_with("box:")
 
 TetMesh parse_tet_mesh_spec(const std::string& spec, const std::string& source, const std::string& field) {
   constexpr double most_cells = 1e5;
-  const auto fail = [&](const std::string& expected) {
-    return input_error(source, field, "found \"" + spec + "\", expected " + expected);
-  };
+  const auto fail = [&](const std::string& expected) { return refused(spec, source, field, expected); };
   const auto length = [&](std::string_view word) {
     const std::optional<double> value = parse_number(word);
     if (!value || !std::isfinite(*value) || *value <= 0)

@@ -36,13 +36,14 @@ TetMesh tet_box(const Eigen::Vector3d& size, const Eigen::Vector3i& cells);
 
 /// "sheet:0.278x0.278:0.01[:pattern]" (pattern one_way, alternating, alternating_by_row, jittered, delaunay)
 /// or "disc:0.2:0.01" or "tshirt:0.014" (data/mesh/tshirt.h); the last length is the cell, rounded so that a
-/// whole number of cells fits. Throws InputError naming `source` and `field`.
+/// whole number of cells fits, and at most the shorter side, or the radius. Throws InputError naming `source`
+/// and `field`, which is empty where the source is an option.
 bool is_mesh_spec(const std::string& text);
 TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source = "mesh",
                              const std::string& field = "sheet");
 
 /// "box:0.1x0.03x0.03:0.01": tet_box of that size with whole cells of about that edge, at most 100,000.
-/// Throws InputError naming `source` and `field`.
+/// Throws InputError likewise.
 bool is_tet_mesh_spec(const std::string& text);
 TetMesh parse_tet_mesh_spec(const std::string& spec, const std::string& source, const std::string& field);
 

@@ -84,6 +84,12 @@ std::vector<std::vector<double>> stack_of(const Arrays& arrays, Names names, con
   return joined(rows_of(*R, 9), rows_of(*t, 3));
 }
 
+bool is_of_poses(const std::string& name) {
+  const Names parts = {"rgripper2base", "tgripper2base", "rtarget2cam", "ttarget2cam"};
+  const auto holds = [&](Names names) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  return holds(kRobot) || holds(kTarget) || holds(parts);
+}
+
 }  // namespace
 
 std::vector<PosePair> load_npz_pairs(const std::string& path) {
@@ -94,6 +100,8 @@ std::vector<PosePair> load_npz_pairs(const std::string& path) {
       throw InputError(path + ": " + name +
                        ": found another array of this name but for capitals and signs, "
                        "expected each once");
+  for (const auto& [name, array] : named)
+    if (is_of_poses(plain(name))) expect_numbers(array, path, name);
   const auto robot = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base"),
              target = stack_of(arrays, kTarget, "rtarget2cam", "ttarget2cam");
   if (robot.empty() || robot.size() != target.size())

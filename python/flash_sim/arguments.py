@@ -1,8 +1,11 @@
 """Arguments of calls as numbers that the simulation takes, or an error that names what was found and what was expected."""
+import os
+
 import numpy as np
 
 from flash_sim.device_array import on_host
 
+FARTHEST = 1e5  # that anything is placed [m], as in scenes
 UNIT_TOLERANCE = 1e-3  # of the length of a quaternion, as in files of trajectories
 
 
@@ -39,6 +42,7 @@ def poses(what, value, current):
     count = len(current)
     given = numbers(what, value, (7,), (3,), (count, 7), (count, 3))
     rows = np.broadcast_to(given, (count, given.shape[-1]))
+    places(what, rows[:, :3])
     if rows.shape[1] == 3:
         rows = np.concatenate([rows, current[:, 3:]], axis=1)
     length = np.linalg.norm(rows[:, 3:], axis=1)
@@ -46,6 +50,13 @@ def poses(what, value, current):
     if len(wrong):
         raise ValueError(f"{what}: found a quaternion of length {length[wrong[0]]:.6g} in row {wrong[0]}, expected 1")
     return np.ascontiguousarray(rows)
+
+
+def places(what, rows):
+    """Throws where a row is farther away than anything is placed."""
+    far = np.argwhere(np.abs(rows) > FARTHEST)
+    if len(far):
+        raise ValueError(f"{what}: found {rows[tuple(far[0])]:.6g} m in row {far[0][0]}, expected at most {FARTHEST:.0f} m")
 
 
 def truths(what, value, count):
@@ -93,7 +104,19 @@ def whole_number(what, value, least, most=2**31 - 1):
 def text(what, value):
     if not isinstance(value, str):
         raise TypeError(f"{what}: found {_kind(value)}, expected a name")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{what}: found {value!r:.60}, half of a character, expected a name that is text") from None
     return value
+
+
+def path(what, value, kind):
+    """The path of a file as text. `kind`: what it should be, as "a scene file"."""
+    try:
+        return text(what, os.fsdecode(value))
+    except TypeError:
+        raise TypeError(f"{what}: found {value!r:.60}, expected the path of {kind}") from None
 
 
 def one_of(what, value, known):

@@ -16,10 +16,7 @@ class Asset:
     """An asset file. Of one that `flash-sysid export` has tuned, what was found and how well it is known."""
 
     def __init__(self, path: str | os.PathLike):
-        try:
-            self.path = os.fspath(path)
-        except TypeError:
-            raise TypeError(f"Asset: path: found {path!r:.60}, expected the path of an asset file") from None
+        self.path = arguments.path("Asset: path", path, "an asset file")
         _core.check_asset(self.path)
         with open(self.path, encoding="utf-8") as file:
             self._file = json.load(file)

@@ -23,6 +23,8 @@ def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1
     except ValueError:
         raise ValueError(f"look_at: found {position.shape}, {target.shape} and {up.shape}, "
                          "expected one row or as many of each") from None
+    arguments.places("look_at: position", rows[0])
+    arguments.places("look_at: target", rows[1])
     forward = _unit("look_at: target", rows[1] - rows[0])
     right = np.cross(forward, _unit("look_at: up", rows[2]))
     along = np.linalg.norm(right, axis=1) < 1e-9
@@ -58,6 +60,7 @@ def poses(what: str, value: ArrayLike, count: int) -> np.ndarray:
         no_turn = np.tile([0.0, 0, 0, 0, 0, 0, 1], (count, 1))
         return arguments.poses(what, given, no_turn)
     matrices = np.array(np.broadcast_to(given, (count, 4, 4)))
+    arguments.places(what, matrices[:, :3, 3])
     turns = matrices[:, :3, :3]
     error = np.abs(np.swapaxes(turns, 1, 2) @ turns - np.eye(3)).max(axis=(1, 2))
     rigid = (error <= arguments.UNIT_TOLERANCE) & (np.linalg.det(turns) > 0) & (matrices[:, 3] == [0, 0, 0, 1]).all(axis=1)
@@ -72,8 +75,10 @@ def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None) ->
     if out is not None:
         if names is not None:
             raise ValueError(f"{what}: found pictures and out, expected one of them: out names its pictures")
-        if not isinstance(out, dict) or not out:
+        if not isinstance(out, dict):
             raise TypeError(f"{what}: out: found {type(out).__name__}, expected a dict of arrays by the name of the picture")
+        if not out:
+            raise ValueError(f"{what}: out: found no picture, expected one array or more by the name of the picture, or None")
         return {name: _given(f"{what}: out", name, array, shape) for name, array in out.items()}
     names = ("depth", "instance") if names is None else (names,) if isinstance(names, str) else names
     try:
@@ -99,6 +104,8 @@ def _given(what, name, array, shape):
 
 
 def _unit(what, rows):
+    largest = np.abs(rows).max(axis=1, keepdims=True, initial=0)  # the square of 1e200 is no number
+    rows = rows / np.where(largest > 0, largest, 1)
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     if not (length > 0).all():
         raise ValueError(f"{what}: found no direction in row {int(np.argmin(length))}, expected one")

@@ -221,6 +221,8 @@ def _pictures(what, value):
         raise TypeError(f"{what}: found {getattr(value, 'dtype', type(value).__name__)}, expected float32")
     if array.ndim != 3:
         raise ValueError(f"{what}: found the shape {array.shape}, expected (n, height, width)")
+    if not all(array.shape[1:]):
+        raise ValueError(f"{what}: found the shape {array.shape}, whose pictures have no pixel, expected one or more")
     if not ((array >= 0) & np.isfinite(array)).all():
         raise ValueError(f"{what}: found a depth below 0 or none at all, expected 0 or more")
     return array

@@ -49,10 +49,7 @@ class RealtimeSim:
 
     def load_config(self, path: str | os.PathLike) -> None:
         """Reads a scene file: the published format, or flash-scene/1. It holds from the next initialize() on."""
-        try:
-            self._scene = _core.load_scene(os.fspath(path))
-        except TypeError:
-            raise TypeError(f"load_config: path: found {path!r:.60}, expected the path of a scene file") from None
+        self._scene = _core.load_scene(arguments.path("load_config: path", path, "a scene file"))
 
     def set_envs(self, n_envs: int) -> None:
         """How many environments the next initialize() makes."""
@@ -88,6 +85,10 @@ class RealtimeSim:
         through. When it closes it holds all vertices within `reach` [m] of the box.
         """
         simulation = self._ready("add_ee")
+        taken = self.status()["steps"]
+        if taken.any():
+            raise ValueError(f"add_ee: found {taken.max():.0f} steps taken since initialize() or reset(), expected end effectors to be "
+                             "added before the first step of all environments")
         no_turn = np.tile([0.0, 0, 0, 0, 0, 0, 1], (self.n_envs, 1))
         simulation.add_end_effector(
             self._new_name("add_ee: name", name), arguments.poses("add_ee: start_pose", start_pose, no_turn),
@@ -308,7 +309,10 @@ class RealtimeSim:
             for seen in sees:
                 arguments.one_of("add_camera: sees", seen, simulation.instances())
         poses = cameras.poses("add_camera: pose", pose, self._initialized_envs)
-        simulation.add_camera(name, size, lens, poses, carrier or "", list(sees or []))
+        try:
+            simulation.add_camera(name, size, lens, poses, carrier or "", list(sees or []))
+        except ValueError as error:  # of obstacles only the scene knows which move
+            raise ValueError(f"add_camera: {error}") from None
 
     def set_camera(self, name: str, pose: ArrayLike, env_ids: ArrayLike | None = None) -> None:
         """Where a camera stands from now on: (7,), (n, 7), (4, 4) or (n, 4, 4), as add_camera has it."""

@@ -15,6 +15,7 @@
 
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
+#include "data/files/folder_lock.h"
 #include "data/files/text.h"
 #include "sysid/emulate/candidate_lines.h"
 #include "sysid/emulate/fingerprint.h"
@@ -120,8 +121,9 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
     : folder_(folder) {
   const bool holds_search = fs::exists(path_of(folder, "grid.json"));
   if (!holds_search && existing != Existing::replace) check_holds_nothing(folder, axes);
+  data::expect_not_held(folder);
   fs::create_directories(folder);
-  lock_ = ::open(path_of(folder, ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  lock_ = ::open(path_of(folder, data::search_lock).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (lock_ < 0) throw std::system_error(errno, std::generic_category(), folder);
   try {
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)

@@ -317,6 +317,28 @@ void check_same_sheet(const data::Recording& first, const data::Recording& secon
                                 " m as in " + first.source + ": two trials are of one cloth");
 }
 
+/// A window that leaves out all that was seen is its own cause.
+void check_window(const data::Recording& first, const Trial& a, const data::Recording& second, const Trial& b,
+                  const RepeatabilitySettings& settings) {
+  std::string seen;
+  for (const auto& [recording, trial] : {std::pair(&first, &a), std::pair(&second, &b)}) {
+    if (trial->keyframes.empty()) return;
+    if (std::any_of(trial->keyframes.begin(), trial->keyframes.end(),
+                    [&](const Seen& each) { return is_scored(each, settings); }))
+      return;
+    seen += (seen.empty() ? "" : ", ") + recording->source + " " +
+            data::format_short(trial->keyframes.front().time) + " to " +
+            data::format_short(trial->keyframes.back().time) + " s";
+  }
+  constexpr double kOpen = 1e200;  // an end that was not given is beyond [s]
+  const auto end = [](const char* option, double value) {
+    return std::abs(value) < kOpen ? std::string(option) + " " + data::format_short(value) : "";
+  };
+  const std::string from = end("--from", settings.score_from), until = end("--until", settings.score_to);
+  throw data::InputError(from + (from.empty() || until.empty() ? "" : ", ") + until +
+                         ": found no keyframe with cloth in between, expected some of " + seen);
+}
+
 void add_distances(const Trial& from, const RepeatabilitySettings& settings,
                    const std::function<VectorXd(const Seen&)>& distances_of, Repeatability& result) {
   for (const Seen& seen : from.keyframes) {
@@ -339,6 +361,7 @@ Repeatability measure_repeatability(const data::Recording& first, const data::Re
                            data::format_short(settings.score_to) + " s, expected --from below --until");
   check_same_sheet(first, second);
   const Trial a = trial_of(first, settings), b = trial_of(second, settings);
+  check_window(first, a, second, b, settings);
   Registration start;
   start.pivot = first.start.colwise().mean().transpose();
   if (first.gravity.norm() > 0) start.up = -first.gravity.normalized();

@@ -56,7 +56,7 @@ void replace_mesh(const std::string& mesh, data::Recording& recording) {
   expect_rigid_start(recording, mesh);
   const data::TriangleMesh own = std::move(recording.mesh);
   const bool was_solid = recording.is_solid();
-  data::load_object_mesh(mesh, "mesh", "sheet", recording);
+  data::load_object_mesh(mesh, "--mesh", "", recording);
   if (recording.is_solid() != was_solid)
     throw data::InputError("--mesh: found " + mesh + ", expected " +
                            (was_solid ? "a solid as box:0.1x0.03x0.03:0.01 or a file of tetrahedra"

@@ -203,7 +203,8 @@ def test_bad_sizes_are_refused_by_name(change):
 
 def test_bad_pictures_are_refused_by_name():
     for what, arguments in (("depth", (disc().astype(float), 1)), ("depth", (disc()[0], 1)), ("depth", (-disc(), 1)),
-                            ("depth", (disc() * np.float32(np.nan), 1)), ("depth", ("x", 1)), ("seed", (disc(), -1)),
+                            ("depth", (disc() * np.float32(np.nan), 1)), ("depth", ("x", 1)), ("depth", (disc()[:, :0], 1)),
+                            ("depth", (disc()[:, :, :0], 1)), ("robot", (disc(), 1, NONE, disc()[:, :0])), ("seed", (disc(), -1)),
                             ("seed", (disc(), 0.5)), ("settings", (disc(), 1, 3)), ("robot", (disc(), 1, NONE, disc(2))),
                             ("robot", (disc(), 1, NONE, 3)), ("lens", (disc(), 1, NONE, None, [1, 2]))):
         with pytest.raises((ValueError, TypeError), match=f"add_depth_noise: {what}: found"):
@@ -212,3 +213,8 @@ def test_bad_pictures_are_refused_by_name():
                             ("degrees", (np.eye(7)[6:], 1, 0, "x")), ("seed", (np.eye(7)[6:], None))):
         with pytest.raises((ValueError, TypeError), match=f"jitter_poses: {what}: found"):
             jitter_poses(*arguments)
+
+
+def test_no_pictures_stay_none():
+    none = add_depth_noise(disc()[:0], 1, lens=[1, 1, 0, 0])
+    assert none.shape == (0,) + disc().shape[1:] and none.dtype == np.float32

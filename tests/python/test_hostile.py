@@ -11,7 +11,7 @@ NAN, INF = float("nan"), float("inf")
 BAD_POSES = [NAN, [NAN] * 7, [0, 0, INF], [0] * 7, [0, 0, 0, 0, 0, 0, 2], [0] * 6, [[0] * 7] * 2, np.zeros((3, 3, 7)), "up", None,
              [1e300, 0, 0], ["a"] * 3, {}, [[0], [0, 1]], np.zeros((0, 7)), 1j, [True] * 7]
 BAD_IDS = [3, -1, [0, 0], [True], [1.5], "all", [[0, 1]], 10**20, [None], {}]
-BAD_NAMES = ["", "foot", None, 3, ["hand"], "towel\0"]
+BAD_NAMES = ["", "foot", None, 3, ["hand"], "towel\0", "\ud800"]
 BAD_STATES = [np.zeros((3, 36)), np.full((3, 36, 3), NAN), np.zeros((2, 36, 3)), np.zeros((3, 35, 3)), "x", 5, {"foot": 0}]
 BAD_COUNTS = [-1, 1.5, "2", None, 2**40, True]
 BAD_NUMBERS = [NAN, -1, "soft", [0.1, 0.2], np.full((3, 1), 0.1), -INF, None]
@@ -21,7 +21,7 @@ CALLS = [
     *[("move_ee", (name, [0, 0, 1])) for name in BAD_NAMES],
     *[("move_ee", ("hand", [0, 0, 1], ids)) for ids in BAD_IDS],
     *[("grasp_ee", ("hand", grasp)) for grasp in ["yes", 1, None, [True, False], [0.5] * 3, np.ones((3, 1), bool)]],
-    *[("add_ee", (name, [0, 0, 1])) for name in [*BAD_NAMES[:1], None, 3, "hand", "table"]],
+    *[("add_ee", (name, [0, 0, 1])) for name in [*BAD_NAMES[:1], None, 3, "hand", "table", "\ud800"]],
     *[("add_ee", ("new", pose)) for pose in BAD_POSES],
     *[("add_ee", ("new", [0, 0, 1], size)) for size in [0, [0, 1, 1], [-1] * 3, [NAN] * 3, [1, 1], "big", [1e300] * 3]],
     *[("add_ee", ("new", [0, 0, 1], [0.05] * 3, reach)) for reach in [-1, NAN, "far", [0.1, 0.1]]],
@@ -42,7 +42,7 @@ CALLS = [
     *[("randomize", ("none", seed)) for seed in [-1, 0.5, "x"]],
     *[("seed", (seed,)) for seed in [-1, 0.5, "x", None]],
     *[("set_envs", (count,)) for count in [0, -5, 1.5, "3", None, 10**12]],
-    *[("load_config", (path,)) for path in ["nowhere.json", None, 5, "/", "", "a\0b"]],
+    *[("load_config", (path,)) for path in ["nowhere.json", None, 5, "/", "", "a\0b", "a\udfff", b"\xff"]],
 ]
 MATERIALS = [{name: value} for name, value in itertools.product(
     ("membrane_stiffness", "areal_density", "friction", "poissons_ratio"), [NAN, -2, "soft", [0.1, 0.2], None])]
@@ -102,8 +102,27 @@ def test_no_scene_and_no_device():
 
 def test_end_effectors_come_before_the_first_step(sim):
     sim.step()
-    with pytest.raises(ValueError, match="before the first"):
+    for steps in (1, 2):
+        with pytest.raises(ValueError, match=f"add_ee: found {steps} steps taken .* before the first step of all environments"):
+            sim.add_ee("late", [0, 0, 1])
+        sim.step()
+    sim.reset([0, 2])
+    with pytest.raises(ValueError, match="add_ee: found 3 steps taken"):
         sim.add_ee("late", [0, 0, 1])
+    sim.reset()
+    sim.add_ee("late", [0, 0, 1])
+    assert sim.end_effectors == ["hand", "late"]
+
+
+def test_what_is_far_or_half_a_character_is_named(sim):
+    for far, where in ([2e5, 0, 0], "2"), ([0, -1e300, 0], "-1e\\+300"):
+        for call, words in ((sim.move_ee, ["hand"]), (sim.add_ee, ["new"])):
+            with pytest.raises(ValueError, match=f"^{call.__name__}: [a-z_]*pose: found {where}[^ ]* m in row 0, expected at most"):
+                call(*words, far)
+    with pytest.raises(ValueError, match="^Asset: path: found .*half of a character"):
+        flash_sim.Asset("a\ud800.json")
+    with pytest.raises(ValueError, match="^add_ee: name: found .*half of a character"):
+        sim.add_ee("\ud800", [0, 0, 1])
 
 
 def test_wild_motions_crash_nothing(sim):

@@ -1,5 +1,6 @@
 """The published listing, to the letter, on scenes of every kind."""
 import json
+import re
 import sys
 
 import numpy as np
@@ -80,3 +81,16 @@ def test_on_the_reference_scenes(name, tmp_path):
     scene = json.loads((scenes / f"{name}.json").read_text())
     path = run.scene_files.write(scene, run.read_vertices(scenes / scene["mesh"]), tmp_path, scenes)
     expect_run(run_listing(path, APART, False, n_envs=2, steps=3), 2, 3)
+
+
+def test_listings_of_the_cameras_stand_alone(tmp_path, monkeypatch):
+    """Each by itself, from the root of the repository, as a reader would copy it."""
+    listings = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "cameras.md").read_text(), re.S)
+    monkeypatch.chdir(ROOT)
+    seen = []
+    for listing in listings:
+        names = {}
+        exec(listing.replace("fold.pgm", str(tmp_path / "fold.pgm")), names)
+        seen.append(names.get("seen", names.get("depth")))
+    assert len(seen) == 2 and (tmp_path / "fold.pgm").stat().st_size == 15 + 320 * 240
+    assert seen[0].min() > 0 and 0.05 < (seen[1] > 0).mean() < 0.5  # a table behind all, and the towel alone

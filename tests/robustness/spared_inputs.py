@@ -20,6 +20,7 @@ def write_inputs(sysid, sim, work):
     asset, recording = program.synthesize(sysid, work)
     program.must(sysid, "grid", recording, "--asset", asset, *SEARCH, "-o", work / "run")
     shutil.copytree(recording, work / "rec2")
+    shutil.copytree(recording, work / "other")
     shutil.copytree(work / "run", work / "run2")
     (work / "raw/frames").mkdir(parents=True)
     for k, cloud in enumerate(sorted((recording / "frames").glob("*.ply"))):
@@ -37,6 +38,9 @@ def write_inputs(sysid, sim, work):
     os.link(work / "rec2/gripper.tum", work / "links/hard.tum")
     (work / "holds").mkdir()
     shutil.copy(work / "asset.json", work / "holds/asset.json")
+    (work / "links/other").symlink_to("../other")
+    (work / "own.json").write_text(json.dumps(program.ASSET))
+    (work / "published.json").write_text(json.dumps({k: v for k, v in program.ASSET.items() if k != "schema"}))
     (work / "leads").mkdir()
     (work / "leads/frames").symlink_to("../rec2/frames")
     (work / "former").mkdir()
@@ -60,6 +64,21 @@ def overwrites(sysid, sim):
     yield [sysid, "export", "run", "--asset", "meshed.json", "-o", "meshed.json"], "meshed.json: is read by this run"
     yield [sysid, "export", "run", "--asset", "meshed.json", "-o", "scan.obj"], "scan.obj: is read by this run"
     yield [sysid, "--config", "options.toml", "plan", "rec2", *asset, "-o", "options.toml"], "options.toml: is read"
+    # What this run does not read, and others would: no result takes its place either.
+    mesh = ["mesh", "scan.obj"]
+    for path, said in (("other/recording.json", "is part of the recording in {work}/other"),
+                       ("other/gripper.tum", "is part of the recording in {work}/other"),
+                       ("links/other/camera_info.yaml", "is part of the recording in {work}/other"),
+                       ("other/frames/000.ply", "is part of the recording in {work}/other"),
+                       ("run2/results.csv", "is part of the search in {work}/run2"), ("scene.json", "is a scene")):
+        for words in ([sysid, "export", "run"], [sysid, "report", "run"], [sysid, "predict", "run", "rec2"],
+                      [sysid, "plan", "rec2", *asset], [sim, *mesh], [sim, "picture", "scan.obj"]):
+            yield [*words, "-o", path], f"{path}: {said}, expected another file for the result"
+        yield [sim, *mesh, "-o", "new.obj", "--flat", path], f"{path}: {said}"
+        yield [sysid, "synth", *asset, "-o", "new", "--truth-out", path], f"{path}: {said}"
+    for path in ("own.json", "published.json"):
+        for words in (["report", "run"], ["predict", "run", "rec2"], ["compare", "run", "run2"]):
+            yield [sysid, *words, "-o", path], f"{path}: is an asset, expected another file for the result"
     for words in (["synth", *asset, "-o", "new"], ["synth", *asset, "-o", "former"]):
         for path in ("asset.json", "links/asset.json"):
             yield [sysid, *words, "--truth-out", path], f"{path}: is read by this run"
@@ -116,6 +135,7 @@ def check_written(options, work):
     for words in (["grid", "rec2", *asset, *SEARCH, "--resume", "-o", "run"],
                   ["grid", "rec2", *asset, *SEARCH, "-o", "rec2/search"], ["predict", "run", "rec2", "-o", "run/former.json"],
                   ["export", "run", "-o", "run/tuned.json"], ["export", "run", "-o", "former.json"],
+                  ["export", "run", "-o", "own.json"],
                   ["report", "run", "-o", "run/report.html"], ["compare", "run", "run2", "-o", "run/comparison.json"],
                   ["replay", "rec2", *asset, "-o", "former"], ["replay", "rec2", *asset, "-o", "rec2/overlay"],
                   ["synth", *asset, "--duration", "0.2", "-o", "former", "--truth-out", "former/mine.json"]):

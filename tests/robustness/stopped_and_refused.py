@@ -163,6 +163,13 @@ def lock_comes_first(sysid, root, asset, recording):
     second = program.call(sysid, "grid", recording, "--asset", asset, *AXES, "--force", "-o", out)
     expect(second.returncode == 2 and "another run is writing to it" in second.stderr, "--force beside a search",
            second.stderr)
+    for verb, words in {"replay": [recording, "--asset", asset], "fit": [recording, "--start", root / "run"],
+                        "synth": ["--asset", asset, "--duration", "0.2"], "segment": [recording / "frames"]}.items():
+        other = program.call(sysid, verb, *words, "--force", "-o", out, timeout=HANG)
+        expect(other.returncode == 2 and other.stderr.count("\n") == 1 and "another run is writing to it" in other.stderr,
+               f"{verb} --force beside a search", other.stderr)
+    names = sorted(path.name for path in out.iterdir() if path.name != "motions")
+    expect(names == [".lock", "grid.json", "keyframes.csv", "registrations.csv", "results.csv"], "files beside a search", names)
     for name in ("grid.json", "results.csv", "registrations.csv", "keyframes.csv"):
         expect((out / name).exists(), f"--force beside a search removes {name}")
     job.terminate()

@@ -158,7 +158,7 @@ TEST_F(ImportOptionsOfAFolder, AreRefusedByTheirNames) {
             "--mesh: found \"sheet:200x200:10\", expected metres (millimetres read as metres?)");
   EXPECT_TRUE(message_of([](ImportOptions& o) {
                 o.mesh = "sheet:0.2:0.02";
-              }).starts_with("import: --mesh: found \"sheet:0.2:0.02\", expected sheet:WIDTHxHEIGHT"));
+              }).starts_with("--mesh: found \"sheet:0.2:0.02\", expected sheet:WIDTHxHEIGHT"));
   EXPECT_EQ(message_of([](ImportOptions& o) { o.mesh = ""; }),
             "import: expected --mesh, as sheet:0.3x0.24:0.01");
   const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");

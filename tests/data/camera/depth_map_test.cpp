@@ -87,7 +87,25 @@ TEST(DepthMap, WhatIsNoDepthIsRefusedByName) {
   EXPECT_EQ(refused("b.npy", npy("<f4", "(2,)", bytes_of<float>({1, 2}))),
             ": found 1 dimensions, expected two, height and width");
   EXPECT_EQ(refused("c.npy", npy("<f4", "(2, 2)", bytes_of<float>({1, 2}))),
-            ": found no array of real numbers, expected what numpy.save writes of one");
+            ": found another number of elements than its shape says (<f4), expected real numbers, as "
+            "numpy.float64");
+  EXPECT_EQ(refused("d.npy", npy("|O", "(1, 2)", "pickle")),
+            ": found objects (|O), expected real numbers, as numpy.float64");
+  EXPECT_EQ(refused("e.npy", npy("<c16", "(1, 1)", bytes_of<double>({1, 2}))),
+            ": found complex numbers (<c16), expected real numbers, as numpy.float64");
+  EXPECT_EQ(refused("f.npy", npy("<U2", "(1, 1)", "a\0\0\0b\0\0\0")),
+            ": found text (<U2), expected real numbers, as numpy.float64");
+  EXPECT_EQ(
+      refused("g.npy", npy(">f8", "(1, 1)", bytes_of<double>({1}))),
+      ": found numbers with their bytes the other way round (>f8), expected real numbers, as numpy.float64");
+  // A scale that is not that of the counts.
+  const std::string counts = folder / "counts.png";
+  save_depth_image({3, 1, {0, 800, 900}}, counts);
+  EXPECT_EQ(input_error_of([&] { load_depth(counts, 1); }),
+            counts +
+                ": found depths of 900 m at 1 m a count, expected a depth scale of 0.001 where counts are "
+                "millimetres, which makes 0.9 m of them");
+  EXPECT_EQ(load_depth(counts, 0.1).at(1, 0), 80);
   EXPECT_EQ(refused("a.tiff", "II*"), ": is no TIFF, or cannot be opened");
   EXPECT_EQ(
       refused("b.tiff", tiff(8, 1, 1, 1, "a")),

@@ -54,5 +54,29 @@ TEST(RunFolder, IsHeldByOneRunAtATime) {
   EXPECT_TRUE(std::filesystem::exists(out + "/log.csv"));
 }
 
+TEST(RunFolder, IsRefusedWhereASearchHoldsTheFolder) {
+  const TemporaryFolder folder;
+  const std::string out = folder / "run";
+  const std::string said = out + ": another run is writing to it; wait for it, or name another folder";
+  std::filesystem::create_directories(out);
+  std::ofstream(out + "/.lock") << "";
+  EXPECT_NO_THROW(expect_not_held(out));
+  const int lock = ::open((out + "/.lock").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(::flock(lock, LOCK_EX | LOCK_NB), 0);
+  EXPECT_EQ(input_error_of([&] { const RunFolder run(out); }), said);
+  EXPECT_EQ(input_error_of([&] { expect_not_held(out); }), said);
+  ::close(lock);
+  {
+    const RunFolder run(out);
+    EXPECT_EQ(input_error_of([&] { expect_not_held(out); }), said);
+    EXPECT_FALSE(is_free(out));
+    const int search = ::open((out + "/.lock").c_str(), O_RDWR | O_CLOEXEC);
+    EXPECT_NE(::flock(search, LOCK_EX | LOCK_NB), 0);  // a search that begins is refused too
+    ::close(search);
+  }
+  EXPECT_NO_THROW(expect_not_held(out));
+  EXPECT_NO_THROW(expect_not_held(folder / "none"));
+}
+
 }  // namespace
 }  // namespace flash::data

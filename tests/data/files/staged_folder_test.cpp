@@ -3,8 +3,10 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <string>
 
 #include "data/files/atomic_file.h"
@@ -102,6 +104,69 @@ TEST(StagedFolder, OneRunWritesToAFolderAtATime) {
   folder.write("new/last.json", "new");
   EXPECT_THROW(late.publish("last.json"), InputError);
   EXPECT_EQ(read_file(folder / "new/last.json"), "new");
+}
+
+std::string generation(int number) { return std::to_string(number); }
+
+void write_generation(StagedFolder& staged, int number) {
+  for (int k = 0; k < 20; ++k)
+    write_atomically(staged.path() + "/frames/" + std::to_string(1000 + k) + ".csv", generation(number),
+                     Sync::later);
+  write_atomically(staged.path() + "/table.csv", generation(number), Sync::later);
+  write_atomically(staged.path() + "/last.json", generation(number), Sync::later);
+}
+
+/// Whether the folder is complete; if so, all of it is of one generation.
+bool is_whole(const std::string& folder) {
+  if (!fs::exists(folder + "/last.json")) return false;
+  const std::string last = read_file(folder + "/last.json");
+  int files = 0;
+  for (const char* place : {"", "/frames"})
+    for (const auto& entry : fs::directory_iterator(folder + place))
+      if (entry.is_regular_file()) {
+        EXPECT_EQ(read_file(entry.path().string()), last) << entry.path();
+        ++files;
+      }
+  EXPECT_EQ(files, 22);
+  return true;
+}
+
+// Kills at any time, most of them while files take their places: what is complete is of one run, and the next
+// run is whole and leaves nothing of the killed ones.
+TEST(StagedFolder, AKillLeavesOneRunsFilesOrNoneThatAreComplete) {
+  const TemporaryFolder folder;
+  const std::string out = folder / "out";
+  int whole = 0, incomplete = 0;
+  for (int trial = 1; trial <= 60; ++trial) {
+    int ready[2];
+    ASSERT_EQ(::pipe(ready), 0);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      StagedFolder staged(out);
+      write_generation(staged, trial);
+      if (::write(ready[1], "r", 1) != 1) ::_exit(1);
+      staged.publish("last.json");
+      ::pause();
+    }
+    char begun = 0;
+    ASSERT_EQ(::read(ready[0], &begun, 1), 1);
+    ::usleep(static_cast<useconds_t>(25 * (trial % 30)));  // 22 renames take some hundred microseconds
+    ::kill(child, SIGKILL);
+    ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+    for (const int end : ready) ::close(end);
+    if (fs::exists(out)) ++(is_whole(out) ? whole : incomplete);
+    if (trial % 5 != 0) continue;
+    {
+      StagedFolder staged(out);
+      write_generation(staged, -trial);
+      staged.publish("last.json");
+    }
+    EXPECT_TRUE(is_whole(out));
+    EXPECT_EQ(read_file(out + "/last.json"), generation(-trial));
+    EXPECT_EQ(files_below(folder / "."), 24u);  // out, frames and the files: nothing else
+  }
+  EXPECT_GT(whole + incomplete, 0);
 }
 
 }  // namespace

@@ -214,9 +214,9 @@ TEST(ProceduralMesh, CellsAreRoundedToFit) {
 }
 
 TEST(ProceduralMesh, WrongSpecsNameFileFieldFoundAndExpected) {
-  for (const char* spec :
-       {"sheet:0.4:0.01", "sheet:0.4x0.4", "sheet:0.4xa:0.01", "sheet:0.4x0.4:0", "sheet:0.4x0.4:0.01:odd",
-        "disc:0.1:0.01:x", "sheet:400x400:0.01", "sheet:-1x1:0.1"}) {
+  for (const char* spec : {"sheet:0.4:0.01", "sheet:0.4x0.4", "sheet:0.4xa:0.01", "sheet:0.4x0.4:0",
+                           "sheet:0.4x0.4:0.01:odd", "disc:0.1:0.01:x", "sheet:400x400:0.01",
+                           "sheet:-1x1:0.1", "disc:", "sheet:0.4x0.2:0.21", "disc:0.1:0.11"}) {
     try {
       parse_mesh_spec(spec, "recording.json", "object.mesh");
       FAIL() << spec;

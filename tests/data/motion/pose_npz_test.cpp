@@ -61,6 +61,18 @@ TEST(PairsOfNumpy, ThatAreNoneAreToldWhatWasFoundAndExpected) {
     return input_error_of([&] { load_pose_pairs(folder.write("pairs.npz", npz_text(arrays))); });
   };
   const std::string unnamed = said({{"arr_0", {2, 4, 4}, kMatrices}, {"arr_1", {2, 4, 4}, kMatrices}});
+  for (const auto& [type, found] :
+       {std::pair("|O", "objects (|O)"), std::pair("<c8", "complex numbers (<c8)"),
+        std::pair("<U16", "text (<U16)"), std::pair("|b1", "truth values (|b1)")}) {
+    const std::string text = said({{"Robot", {2, 4, 4}, kMatrices, type}, {"target", {2, 4, 4}, kMatrices}});
+    EXPECT_TRUE(text.ends_with("pairs.npz: Robot: found " + std::string(found) +
+                               ", expected real numbers, as numpy.float64"))
+        << text;
+  }
+  // What is not asked for may hold anything.
+  expect_both(load_pose_pairs(folder.write("pairs.npz", npz_text({{"target", {2, 4, 4}, kMatrices},
+                                                                  {"names", {2}, {7, 8}, "<U2"},
+                                                                  {"robot", {2, 4, 4}, kMatrices}}))));
   EXPECT_NE(unnamed.find("pairs.npz: found arr_0 2 x 4 x 4, arr_1 2 x 4 x 4, expected as many poses"),
             std::string::npos)
       << unnamed;
