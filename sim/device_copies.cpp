@@ -56,13 +56,13 @@ void read_device(int cuda_device, const void* from, std::size_t bytes, void* to)
   });
 }
 
-KeptCudaDevice::KeptCudaDevice() {
-  if (cudaGetDevice(&device_) != cudaSuccess) device_ = -1;
+int cuda_device_of_thread() {
+  int device = -1;
+  return cudaGetDevice(&device) == cudaSuccess ? device : -1;
 }
 
-KeptCudaDevice::~KeptCudaDevice() {
-  int now = -1;
-  if (device_ >= 0 && cudaGetDevice(&now) == cudaSuccess && now != device_) cudaSetDevice(device_);
+void return_to_cuda_device(int device) {
+  if (device >= 0 && cuda_device_of_thread() != device) cudaSetDevice(device);
 }
 
 #else
@@ -79,8 +79,8 @@ void read_device(int, const void*, std::size_t, void*) {
   throw data::InputError("--device cuda: " + why_no_cuda());
 }
 
-KeptCudaDevice::KeptCudaDevice() = default;
-KeptCudaDevice::~KeptCudaDevice() = default;
+int cuda_device_of_thread() { return -1; }
+void return_to_cuda_device(int) {}
 
 #endif
 

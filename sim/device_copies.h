@@ -30,15 +30,22 @@ class DeviceCopies {
 /// ended.
 void read_device(int cuda_device, const void* from, std::size_t bytes, void* to);
 
+/// The CUDA device that this thread works with, -1 where there is none.
+int cuda_device_of_thread();
+
+/// Makes it that one again; does nothing for -1.
+void return_to_cuda_device(int device);
+
 /// The CUDA device that this thread works with is the same afterwards: other libraries look at it too.
 class KeptCudaDevice {
  public:
-  KeptCudaDevice();
-  ~KeptCudaDevice();
+  KeptCudaDevice() : device_(cuda_device_of_thread()) {}
+  ~KeptCudaDevice() { return_to_cuda_device(device_); }
   KeptCudaDevice(const KeptCudaDevice&) = delete;
+  KeptCudaDevice& operator=(const KeptCudaDevice&) = delete;
 
  private:
-  int device_ = -1;
+  int device_;
 };
 
 }  // namespace flash::sim
