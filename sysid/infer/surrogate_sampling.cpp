@@ -96,6 +96,8 @@ SurrogateDraws sample_by_surrogate(const LogDensities& log_densities, const Eige
   constexpr double kPower = 0.5;  // of the draws for the tails
   constexpr double kTrusted =
       0.6;  // agreement of draws that tell coordinates; without a likely one it is 0.5
+  constexpr double kLeast =
+      0.75;  // agreement of draws that may stand; half of them cells that are empty: 2 / 3
   const Index d = low.size(), fresh = 4 * (d + 1), tails = 2 * (d + 1);
   constexpr int kTries = 4;
   Asking ask(log_densities, asked);
@@ -121,7 +123,7 @@ SurrogateDraws sample_by_surrogate(const LogDensities& log_densities, const Eige
     if (failed == 0) coordinates = coordinates_of(found.draws, high - low);
     if (failed == kTries) break;
   }
-  if (!(found.agreement > kTrusted)) {
+  if (!(found.agreement > kLeast)) {
     found.draws = sample_by_importance(
         [&](const Eigen::MatrixXd& points) { return ask(points); }, low, high,
         {.enough = settings.enough_without, .most = settings.most, .seed = settings.seed});

@@ -29,7 +29,8 @@ Eigen::VectorXd weights_of_power(const WeightedDraws& draws, double power);
 /// points, unless draws `before` show it. Then a LogDensitySurrogate is sampled, some of its draws are asked
 /// for, weighted by what they turn out to be, and added to what the surrogate is fitted to, until these
 /// weights are as good as 1. Some are of the square root of the density, so that its tails are known. Where
-/// four surrogates in a row have hardly any likely draw, sample_by_importance goes on by itself. `asked`:
+/// four surrogates in a row have hardly any likely draw, or the last agrees by less than 0.75,
+/// sample_by_importance goes on by itself. `asked`:
 /// what is known of the density already, if anything; it grows. Throws what sample_by_importance does.
 SurrogateDraws sample_by_surrogate(const LogDensities& log_densities, const Eigen::VectorXd& low,
                                    const Eigen::VectorXd& high, AskedPoints& asked,
