@@ -134,8 +134,9 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   const sysid::MemoryEstimate memory = sysid::estimate_memory(replays, settings, !options.no_solver_check);
   sysid::check_job(replays, sysid::count_candidates(settings.axes), memory);
   end_after_signal();
-  sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
-                            sysid::fingerprint(replays, settings),
+  sysid::Fingerprint print = sysid::fingerprint(replays, settings);
+  if (options.sampled) print["posterior (--sampled)"] = "importance sampling";
+  sysid::ResultsStore store(options.out, settings.axes, names_of(recordings), print,
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace
                                                    : sysid::Existing::refuse);

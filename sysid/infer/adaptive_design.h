@@ -5,6 +5,7 @@
 
 #include "sysid/emulate/two_mesh_motions.h"
 #include "sysid/infer/answer_work.h"
+#include "sysid/infer/importance_sampling.h"
 #include "sysid/infer/motion_likelihood.h"
 #include "sysid/infer/posterior.h"
 
@@ -23,7 +24,7 @@ Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& a
 struct Look {
   MotionLikelihood likelihood;
   Posterior posterior;
-  std::optional<double> effective_size = {};  ///< of a sampled one (sampled_look)
+  std::optional<WeightedDraws> draws = {};  ///< of a sampled one (sampled_look)
 };
 
 /// What stands in for the simulations of a search.

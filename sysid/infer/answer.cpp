@@ -361,11 +361,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         " on the same mesh: errors of the cells, of the step and of what is held decide "
         "between them; search on a finer mesh, with a shorter step, or what is held too");
   warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
-  if (const double size = there.look.effective_size.value_or(INFINITY); size < ImportanceSettings{}.enough)
-    answer.warnings.push_back("the posterior stands on " + std::to_string(std::lround(size)) +
-                              " effective draws, expected " +
-                              std::to_string(std::lround(ImportanceSettings{}.enough)) +
-                              ": intervals are rough; search fewer parameters or a smaller range");
+  if (there.look.draws && !there.look.draws->enough)
+    answer.warnings.push_back(
+        "the posterior stands on " + std::to_string(std::lround(there.look.draws->effective_size)) +
+        " effective draws, expected " + std::to_string(std::lround(ImportanceSettings{}.enough)) +
+        ": intervals are rough; search fewer parameters or a smaller range");
 
   Posterior posterior = there.look.posterior;
   if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);

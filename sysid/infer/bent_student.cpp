@@ -99,13 +99,17 @@ void bend(BentStudent& student, const Parabola& parabola, const Eigen::MatrixXd&
 
 }  // namespace
 
-Eigen::ArrayXd BentStudent::densities(const Eigen::MatrixXd& points) const {
-  const auto d = static_cast<double>(mean.size());
+Eigen::MatrixXd BentStudent::white(const Eigen::MatrixXd& points) const {
   Eigen::MatrixXd r = points.transpose().colwise() - mean;
   const Eigen::RowVectorXd squares = (along.transpose() * r).cwiseAbs2();
   r -= bend * squares;
   root.triangularView<Eigen::Lower>().solveInPlace(r);
-  const Eigen::ArrayXd distances = r.colwise().squaredNorm().transpose().array();
+  return r.transpose();
+}
+
+Eigen::ArrayXd BentStudent::densities(const Eigen::MatrixXd& points) const {
+  const auto d = static_cast<double>(mean.size());
+  const Eigen::ArrayXd distances = white(points).rowwise().squaredNorm().array();
   const double log_peak = std::lgamma((kFreedom + d) / 2) - std::lgamma(kFreedom / 2.0) -
                           d / 2 * std::log(kFreedom * M_PI) - root.diagonal().array().log().sum();
   return (log_peak - (kFreedom + d) / 2 * (1 + distances / kFreedom).log()).exp();

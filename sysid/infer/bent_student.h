@@ -13,6 +13,8 @@ struct BentStudent {
   Eigen::VectorXd mean, along, bend;
   Eigen::MatrixXd root;  ///< lower triangular
 
+  /// Coordinates r in units of root, in which it is a straight one about 0 of scale 1: of points, a row each.
+  Eigen::MatrixXd white(const Eigen::MatrixXd& points) const;
   /// Of points, a row each.
   Eigen::ArrayXd densities(const Eigen::MatrixXd& points) const;
   Eigen::VectorXd draw(RandomNumbers& random) const;

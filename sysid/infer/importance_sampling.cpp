@@ -104,19 +104,6 @@ class Sample {
   std::vector<Mixture> mixtures_;
 };
 
-/// Rows at the middles of even parts of the weights' sum, moved by `offset` of a part.
-std::vector<Index> systematic_rows(const Eigen::VectorXd& weights, Index count, double offset) {
-  std::vector<Index> rows;
-  double sum = weights[0];
-  Index row = 0;
-  for (Index i = 0; i < count; ++i) {
-    const double at = (static_cast<double>(i) + offset) / static_cast<double>(count);
-    while (sum <= at && row + 1 < weights.size()) sum += weights[++row];
-    rows.push_back(row);
-  }
-  return rows;
-}
-
 /// One component for all points, which has half, and some for neighbourhoods of points drawn by weight.
 Mixture fitted_mixture(const Eigen::MatrixXd& all, const Eigen::VectorXd& all_weights,
                        RandomNumbers& random) {
@@ -190,6 +177,18 @@ Sample first_sample(const Asked& asked, Index dimensions, const ImportanceSettin
 }
 
 }  // namespace
+
+std::vector<Index> systematic_rows(const Eigen::VectorXd& weights, Index count, double offset) {
+  std::vector<Index> rows;
+  double sum = weights[0];
+  Index row = 0;
+  for (Index i = 0; i < count; ++i) {
+    const double at = (static_cast<double>(i) + offset) / static_cast<double>(count);
+    while (sum <= at && row + 1 < weights.size()) sum += weights[++row];
+    rows.push_back(row);
+  }
+  return rows;
+}
 
 double WeightedDraws::quantile(Eigen::Index k, double share) const {
   std::vector<Index> order;

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <functional>
+#include <vector>
 
 namespace flash::sysid {
 
@@ -30,6 +31,10 @@ struct WeightedDraws {
   /// Draws of one weight each, a row each, by systematic resampling.
   Eigen::MatrixXd resampled(Eigen::Index count, unsigned seed = 1) const;
 };
+
+/// Rows of draws of one weight each, by systematic resampling: those at the middles of `count` even parts of
+/// the weights' sum, moved by `offset` of a part.
+std::vector<Eigen::Index> systematic_rows(const Eigen::VectorXd& weights, Eigen::Index count, double offset);
 
 /// Adaptive multiple importance sampling in the box from `low` to `high` (Cornuet, Marin, Mira and Robert
 /// 2012). Points that fill the box evenly come first, then batches drawn from mixtures of BentStudent,

@@ -53,14 +53,16 @@ std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>&
 
 std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
                                const Extent& extent, const std::vector<double>& at,
-                               std::vector<KnownError> errors, std::vector<KnownError>& held) {
-  const auto look = [&](const Extent& start, const std::vector<double>& values) {
+                               std::vector<KnownError> errors, std::vector<KnownError>& held,
+                               const std::optional<WeightedDraws>& before) {
+  const auto look = [&](const Extent& start, const std::vector<double>& values,
+                        const std::optional<WeightedDraws>& draws) {
     if (task.settings.sampled)
       return sampled_look(emulator, start, values, axes, task.grid, task.settings.repeatability, errors,
-                          task.told);
+                          task.told, draws ? &*draws : nullptr);
     return narrow(emulator, start, values, axes, task.grid, task.settings.repeatability, errors, task.told);
   };
-  const Look first = look(extent, at);
+  const Look first = look(extent, at, before);
   std::vector<FinerSettings> finer;
   if (task.settings.solver_check) finer = finer_settings(task.replays);
   const bool knows_solution = std::any_of(held.begin(), held.end(), is_of_solution),
@@ -83,11 +85,11 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
       errors.insert(errors.end(), more->begin(), more->end());
   };
   take_all();
-  Look second = look(extent_of(first.posterior.axes), first.posterior.values());
+  Look second = look(extent_of(first.posterior.axes), first.posterior.values(), first.draws);
   if (const std::vector<double> values = second.posterior.values();
       has_left_cells(second.posterior, held) && follow_with_cells(task, values, held)) {
     take_all();
-    second = look(extent_of(second.posterior.axes), values);
+    second = look(extent_of(second.posterior.axes), values, second.draws);
   }
   return Found{std::move(emulator), axes, std::move(second), std::move(*estimate), std::move(errors)};
 }
@@ -108,7 +110,8 @@ std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes) 
 
 std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
                                 bool finer, const std::vector<KnownError>& errors,
-                                std::vector<KnownError>& held, bool many) {
+                                std::vector<KnownError>& held, bool many,
+                                const std::optional<WeightedDraws>& before) {
   const std::size_t most = many ? many_motions(task.ranges) : few_motions(task.ranges);
   const std::vector<Axis> axes = lattice(extent, task.ranges, many ? 4 : 3, most);
   if (cartesian_product(axes).size() > most) return std::nullopt;
@@ -116,7 +119,7 @@ std::optional<Found> look_about(const Task& task, const Extent& extent, const st
   std::optional<Emulator> emulator = emulator_over(
       task, axes, finer ? thinned(lattice(extent, task.ranges, 2, most / 3)) : std::vector<Axis>{}, true);
   if (!emulator) return std::nullopt;
-  return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
+  return look_with(task, std::move(*emulator), axes, extent, at, errors, held, before);
 }
 
 std::vector<KnownError> errors_about(const Found& found, std::vector<KnownError> more) {
@@ -214,8 +217,8 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
   int dense = 0;
   for (int round = 0; round < lattice_rounds && dense < kDense; ++round) {
     if (many) ++dense;
-    std::optional<Found> there =
-        look_about(task, extent, found.look.posterior.values(), finer, found.errors, held, many);
+    std::optional<Found> there = look_about(task, extent, found.look.posterior.values(), finer, found.errors,
+                                            held, many, found.look.draws);
     if (!there) {
       found.unrefined =
           "a motion nearer to the answer diverged: the answer is interpolated between those farther away";

@@ -36,17 +36,19 @@ struct Found {
 };
 
 /// Looks twice: for the estimate, and again with what solving it says of errors. `held`: errors by what is
-/// held and of the cells, found at the first estimate unless they are there already. Empty where the estimate
-/// diverges.
+/// held and of the cells, found at the first estimate unless they are there already. `before`: draws of an
+/// earlier look, where that was sampled. Empty where the estimate diverges.
 std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
                                const Extent& extent, const std::vector<double>& at,
-                               std::vector<KnownError> errors, std::vector<KnownError>& held);
+                               std::vector<KnownError> errors, std::vector<KnownError>& held,
+                               const std::optional<WeightedDraws>& before = {});
 
 /// One lattice over an extent, of few values or of many, and what its motions say; empty where too many would
 /// be needed, or one diverged.
 std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
                                 bool finer, const std::vector<KnownError>& errors,
-                                std::vector<KnownError>& held, bool many = false);
+                                std::vector<KnownError>& held, bool many = false,
+                                const std::optional<WeightedDraws>& before = {});
 
 /// Motions simulated anew about the answer, where few simulations do: again while it leaves them or takes too
 /// little of them; with more of them where the emulator misses much, and then about what is likely alone.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace flash::sysid {
 namespace {
@@ -22,15 +23,6 @@ Eigen::VectorXd corner_of(const std::vector<Axis>& axes, bool last) {
   return corner;
 }
 
-/// The weights under a power of the density above 1.
-Eigen::VectorXd sharpened(const WeightedDraws& draws, double power) {
-  const double highest = draws.log_densities.maxCoeff();
-  Eigen::VectorXd weights = draws.weights;
-  for (Eigen::Index i = 0; i < weights.size(); ++i)
-    weights[i] *= std::exp((power - 1) * (draws.log_densities[i] - highest));
-  return weights / weights.sum();
-}
-
 /// The least deviance of draws near the ends of each coordinate, over that of all.
 Eigen::ArrayX2d ends_of(const WeightedDraws& draws, const Eigen::VectorXd& low, const Eigen::VectorXd& high) {
   constexpr double kNear = 0.02;  // of the box
@@ -46,26 +38,6 @@ Eigen::ArrayX2d ends_of(const WeightedDraws& draws, const Eigen::VectorXd& low, 
   return ends;
 }
 
-/// Draws of the likelihood over the box of `axes`.
-WeightedDraws drawn(const Emulator& emulator, const std::vector<Axis>& axes,
-                    const MotionLikelihood& likelihood, const GridSettings& grid,
-                    const ImportanceSettings& settings, const TellWork& told) {
-  const std::vector<Eigen::Index> searched = searched_of(axes);
-  const Eigen::VectorXd low = corner_of(axes, false), high = corner_of(axes, true);
-  const auto log_densities = [&](const Eigen::MatrixXd& draws) -> Eigen::VectorXd {
-    std::vector<std::vector<double>> points(static_cast<std::size_t>(draws.rows()));
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      for (const Axis& axis : axes) points[i].push_back(axis.values.front());
-      for (std::size_t j = 0; j < searched.size(); ++j) {
-        const auto k = static_cast<std::size_t>(searched[j]);
-        points[i][k] = value_of(axes[k], draws(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)));
-      }
-    }
-    return -0.5 * deviance_at(emulator, points, likelihood, grid, told);
-  };
-  return sample_by_importance(log_densities, low(searched), high(searched), settings);
-}
-
 }  // namespace
 
 Posterior posterior_of(const std::vector<Axis>& axes, const WeightedDraws& draws) {
@@ -74,39 +46,84 @@ Posterior posterior_of(const std::vector<Axis>& axes, const WeightedDraws& draws
   const std::vector<Eigen::Index> searched = searched_of(axes);
   const Eigen::VectorXd low = corner_of(axes, false), high = corner_of(axes, true);
   Posterior posterior{axes, low, low.transpose().replicate(kDraws, 1), Eigen::ArrayX2d::Zero(low.size(), 2)};
-  posterior.estimate(searched) = draws.points.transpose() * sharpened(draws, kPower);
+  posterior.estimate(searched) = draws.points.transpose() * weights_of_power(draws, kPower);
   posterior.samples(Eigen::all, searched) = draws.resampled(kDraws);
   posterior.ends(searched, Eigen::all) = ends_of(draws, low(searched), high(searched));
   return posterior;
 }
 
-Look sampled_look(const Emulator& emulator, const Extent& start, const std::vector<double>& at,
-                  const std::vector<Axis>& axes, const GridSettings& grid,
-                  std::optional<double> repeatability, const std::vector<KnownError>& errors,
-                  const TellWork& told) {
+Sampled sample_extents(const DensityAbout& density, const Extent& start, const std::vector<double>& at,
+                       const std::vector<Axis>& axes, const WeightedDraws* before) {
   constexpr int kRounds = 12;
-  constexpr double kRough = 100;  // effective size of a round before the last
-  if (searched_of(axes).empty()) return narrow(emulator, start, at, axes, grid, repeatability, errors, told);
-  std::vector<Replay> replays;
-  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
+  constexpr double kRough = 0.9;      // agreement in a round before the last
+  constexpr double kRoughSize = 100;  // effective size there without a surrogate
+  const std::vector<Eigen::Index> searched = searched_of(axes);
   Extent extent = start;
   std::vector<double> values = at;
+  Sampled sampled;
+  WeightedDraws rough_draws;
   for (int round = 1;; ++round) {
-    MotionLikelihood likelihood(replays, motions_at(emulator, values, emulator.share), grid.score,
-                                repeatability, errors, rates_at(emulator, values, extent, axes),
-                                emulator.first);
-    const std::vector<Axis> here = axes_over(extent, axes);
-    const Posterior rough =
-        posterior_of(here, drawn(emulator, here, likelihood, grid, {.enough = kRough}, told));
+    const LogDensities here = density(values, extent);
+    const std::vector<Axis> box = axes_over(extent, axes);
+    const Eigen::VectorXd low = corner_of(box, false)(searched), high = corner_of(box, true)(searched);
+    AskedPoints asked;
+    SurrogateSettings settings;
+    settings.before = before;
+    settings.agreement = kRough;
+    settings.enough_without = kRoughSize;
+    sampled.of = sample_by_surrogate(here, low, high, asked, settings);
+    const Posterior rough = posterior_of(box, sampled.of.draws);
     const Extent next = next_extent(extent, rough, axes);
-    if (next == extent || round == kRounds) {
-      const WeightedDraws draws = drawn(emulator, here, likelihood, grid, {}, told);
-      if (told) told({}, {0, most_scores(axes)});
-      return {std::move(likelihood), posterior_of(here, draws), draws.effective_size};
+    const bool last = next == extent || round == kRounds;
+    if (last) {
+      rough_draws = std::move(sampled.of.draws);
+      settings = {};
+      settings.before = &rough_draws;
+      sampled.of = sample_by_surrogate(here, low, high, asked, settings);
+    }
+    sampled.asked += static_cast<int>(asked.size());
+    if (last) {
+      sampled.posterior = posterior_of(box, sampled.of.draws);
+      return sampled;
     }
     values = rough.values();
     extent = next;
+    rough_draws = std::move(sampled.of.draws);
+    before = &rough_draws;
   }
+}
+
+Look sampled_look(const Emulator& emulator, const Extent& start, const std::vector<double>& at,
+                  const std::vector<Axis>& axes, const GridSettings& grid,
+                  std::optional<double> repeatability, const std::vector<KnownError>& errors,
+                  const TellWork& told, const WeightedDraws* before) {
+  const std::vector<Eigen::Index> searched = searched_of(axes);
+  if (searched.empty()) return narrow(emulator, start, at, axes, grid, repeatability, errors, told);
+  std::vector<Replay> replays;
+  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
+  std::optional<MotionLikelihood> likelihood;
+  int asked = 0, allowed = most_scores(axes);
+  const auto density = [&](const std::vector<double>& values, const Extent& extent) -> LogDensities {
+    likelihood.emplace(replays, motions_at(emulator, values, emulator.share), grid.score, repeatability,
+                       errors, rates_at(emulator, values, extent, axes), emulator.first);
+    return [&](const Eigen::MatrixXd& draws) -> Eigen::VectorXd {
+      std::vector<std::vector<double>> points(static_cast<std::size_t>(draws.rows()));
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        for (const Axis& axis : axes) points[i].push_back(axis.values.front());
+        for (std::size_t j = 0; j < searched.size(); ++j) {
+          const auto k = static_cast<std::size_t>(searched[j]);
+          points[i][k] = value_of(axes[k], draws(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)));
+        }
+      }
+      asked += static_cast<int>(points.size());
+      if (told && asked > allowed) told({}, {0, allowed - asked});
+      allowed = std::max(allowed, asked);
+      return -0.5 * deviance_at(emulator, points, *likelihood, grid, told);
+    };
+  };
+  Sampled sampled = sample_extents(density, start, at, axes, before);
+  if (told) told({}, {0, allowed - asked});
+  return {std::move(*likelihood), std::move(sampled.posterior), std::move(sampled.of.draws)};
 }
 
 }  // namespace flash::sysid

@@ -1,9 +1,9 @@
 // Whether posteriors on ridges are right, straight and bent ones, against exact answers: quantiles, how often
 // intervals hold the truth, and at how many points the likelihood is asked for.
 //   ridge_study [WAY [DRAWS [FIRST_SEED [DIMENSIONS]]]]
-// WAY is `exact` (the formula), `grid` (refined grids with splines), `importance` (importance sampling) or
-// empty: all. A row is of DRAWS truths and data, by default 200, of DIMENSIONS parameters, by default of 2 to
-// 6.
+// WAY is `exact` (the formula), `grid` (refined grids with splines), `importance` (importance sampling),
+// `surrogate` (of a surrogate, as --sampled has it) or empty: all. A row is of DRAWS truths and data, by
+// default 200, of DIMENSIONS parameters, by default of 2 to 6.
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -20,6 +20,7 @@
 #include "data/machine/parallel.h"
 #include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/importance_sampling.h"
+#include "sysid/infer/sampled_look.h"
 #include "tests/sysid/infer/ridge.h"
 
 namespace flash::sysid {
@@ -79,6 +80,27 @@ Found by_importance(const Ridge& ridge, unsigned seed) {
   return found;
 }
 
+/// As sampled_look does it, on the box from 0 to 1.
+Found by_surrogate(const Ridge& ridge, unsigned) {
+  const Eigen::Index d = ridge.dimensions();
+  const std::vector<Axis> searched(static_cast<std::size_t>(d), {.name = "x", .values = {0, 1}});
+  const auto density = [&](const std::vector<double>&, const Extent&) -> LogDensities {
+    return [&](const Eigen::MatrixXd& points) -> Eigen::VectorXd {
+      Eigen::VectorXd logs(points.rows());
+      for (Eigen::Index i = 0; i < points.rows(); ++i) logs[i] = ridge.log_density(points.row(i).transpose());
+      return logs;
+    };
+  };
+  const Sampled sampled = sample_extents(density, extent_of(searched),
+                                         std::vector<double>(static_cast<std::size_t>(d), 0.5), searched);
+  Found found{Eigen::MatrixX3d(d, 3), sampled.asked, sampled.of.draws.effective_size};
+  for (Eigen::Index k = 0; k < d; ++k)
+    for (std::size_t s = 0; s < kShares.size(); ++s)
+      found.quantiles(k, static_cast<Eigen::Index>(s)) =
+          sampled.posterior.quantile(static_cast<std::size_t>(k), kShares[s]);
+  return found;
+}
+
 /// How often exact intervals hold these truths, by chance.
 Found by_formula(const Ridge& ridge, unsigned) {
   Found found{Eigen::MatrixX3d(ridge.dimensions(), 3)};
@@ -93,7 +115,8 @@ struct Way {
   Found (*find)(const Ridge& ridge, unsigned seed);
 };
 
-constexpr Way kWays[] = {{"exact", by_formula}, {"grid", by_grids}, {"importance", by_importance}};
+constexpr Way kWays[] = {
+    {"exact", by_formula}, {"grid", by_grids}, {"importance", by_importance}, {"surrogate", by_surrogate}};
 
 /// Bends and stretches.
 constexpr std::array<std::array<double, 2>, 3> kShapes = {{{0, 0}, {0.5, 0}, {0, 0.4}}};

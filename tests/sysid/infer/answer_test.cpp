@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 
 #include "tests/sysid/short_lift.h"
 
@@ -24,7 +25,7 @@ AnswerSettings without_horizon() {
   return settings;
 }
 
-TEST(Answer, IsTheSameOnAnyThreads) {
+void expect_the_same_on_any_threads(bool sampled) {
   const data::TemporaryFolder folder;
   GridSettings grid = bending_grid();
   grid.axes.push_back(parse_axis("friction", "0.1:0.6:4"));
@@ -34,10 +35,23 @@ TEST(Answer, IsTheSameOnAnyThreads) {
   ASSERT_TRUE(grid_search(replays, grid, store));
   AnswerSettings asked = without_horizon();
   asked.solver_check = false;
+  asked.sampled = sampled;
   const auto answer = [&](int threads) {
     GridResults results = store.results();
     grid.threads = replays[0].settings.threads = threads;
-    return find_answer(results, replays, grid, asked);
+    AnswerMeter meter(most_work(grid, 1, false));
+    std::mutex counting;
+    bool kept = true;
+    Answer found =
+        find_answer(results, replays, grid, asked, [&](const AnswerWork& done, const AnswerWork& spared) {
+          const std::scoped_lock lock(counting);
+          meter.take(done, spared);
+          kept = kept && meter.done().scores <= meter.most().scores &&
+                 meter.done().motions <= meter.most().motions;
+        });
+    EXPECT_TRUE(kept);  // what there is at most, at any time
+    EXPECT_GT(meter.done().scores, 0);
+    return found;
   };
   const Answer one = answer(1), four = answer(4);
   EXPECT_EQ(one.values, four.values);
@@ -45,6 +59,10 @@ TEST(Answer, IsTheSameOnAnyThreads) {
   EXPECT_EQ(one.estimate.score, four.estimate.score);
   EXPECT_EQ(one.open_information, four.open_information);
 }
+
+TEST(Answer, IsTheSameOnAnyThreads) { expect_the_same_on_any_threads(false); }
+
+TEST(Answer, IsTheSameOnAnyThreadsWhereItIsSampled) { expect_the_same_on_any_threads(true); }
 
 TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   const data::TemporaryFolder folder;

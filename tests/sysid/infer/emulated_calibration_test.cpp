@@ -8,6 +8,7 @@
 #include <random>
 
 #include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/sampled_look.h"
 #include "tests/sysid/moving_sheet.h"
 
 namespace flash::sysid {
@@ -116,15 +117,17 @@ class Problem {
   }
 
   /// Twice, as the answer of a search does: about the middle of the ranges, then about what was found.
-  Look look() const {
+  Look look(bool sampled = false) const {
     const Emulator emulator = this->emulator();
     const GridSettings grid = this->grid();
     const std::vector<double> middle = {axes_[0].values[2], axes_[1].values[2]};
-    const auto about = [&](const Extent& extent, const std::vector<double>& at) {
+    const auto about = [&](const Extent& extent, const std::vector<double>& at, const WeightedDraws* before) {
+      if (sampled) return sampled_look(emulator, extent, at, axes_, grid, {}, {error()}, {}, before);
       return narrow(emulator, extent, at, axes_, grid, {}, {error()});
     };
-    const Look first = about(extent_of(axes_), middle);
-    return about(extent_of(first.posterior.axes), first.posterior.values());
+    const Look first = about(extent_of(axes_), middle, nullptr);
+    return about(extent_of(first.posterior.axes), first.posterior.values(),
+                 first.draws ? &*first.draws : nullptr);
   }
 
   Emulator emulator() const { return {{{replay_, TwoMeshMotions(*interpolant_)}}, 0}; }
@@ -146,14 +149,14 @@ class Problem {
   std::optional<MotionInterpolant> interpolant_;
 };
 
-TEST(EmulatedCalibration, RanksOfTheTruthAreEven) {
-  constexpr int kProblems = 200, kBins = 10;
+void expect_even_ranks(bool sampled, int problems) {
+  constexpr int kBins = 10;
   Problem problem;
   std::mt19937_64 random(20);
   std::array<std::array<int, kBins>, 2> ranks{};
-  for (int i = 0; i < kProblems; ++i) {
+  for (int i = 0; i < problems; ++i) {
     const std::array<double, 2> truth = problem.draw(random);
-    const Look look = problem.look();
+    const Look look = problem.look(sampled);
     for (std::size_t k = 0; k < 2; ++k) {
       const auto draws = look.posterior.samples.col(static_cast<Eigen::Index>(k)).array();
       const double below = (draws < truth[k]).cast<double>().mean();
@@ -162,20 +165,24 @@ TEST(EmulatedCalibration, RanksOfTheTruthAreEven) {
   }
   for (const auto& counts : ranks) {
     double chi2 = 0;
-    constexpr double kExpected = static_cast<double>(kProblems) / kBins;
-    for (const int count : counts) chi2 += std::pow(count - kExpected, 2) / kExpected;
+    const double expected = static_cast<double>(problems) / kBins;
+    for (const int count : counts) chi2 += std::pow(count - expected, 2) / expected;
     EXPECT_LT(chi2, 21.67);  // 99 % at 9 degrees of freedom
   }
 }
 
+TEST(EmulatedCalibration, RanksOfTheTruthAreEven) { expect_even_ranks(false, 200); }
+
+TEST(SampledLook, RanksOfTheTruthAreEven) { expect_even_ranks(true, 100); }
+
 // Each quantile by quadrature of the likelihood itself over the whole range, on a grid far finer than the
 // posterior's.
-TEST(EmulatedCalibration, QuantilesAreThoseOfNestedQuadrature) {
+void expect_quantiles_of_quadrature(bool sampled) {
   constexpr int kFine = 60;
   Problem problem;
   std::mt19937_64 random(5);
   problem.draw(random);
-  const Look look = problem.look();
+  const Look look = problem.look(sampled);
   std::vector<Axis> fine = problem.axes();
   for (Axis& axis : fine) {
     const double low = coordinate_of(axis, axis.values.front()),
@@ -204,10 +211,15 @@ TEST(EmulatedCalibration, QuantilesAreThoseOfNestedQuadrature) {
       const double below =
           marginal.head(whole).sum() + (cells - static_cast<double>(whole)) * marginal[whole];
       // 12,800 draws of some 30 sweeps' memory are worth 1,600 or more.
-      EXPECT_NEAR(below, share, 3 * std::sqrt(share * (1 - share) / 1600)) << axis.name;
+      const double worth = look.draws ? look.draws->effective_size : 1600;
+      EXPECT_NEAR(below, share, 3 * std::sqrt(share * (1 - share) / worth)) << axis.name;
     }
   }
 }
+
+TEST(EmulatedCalibration, QuantilesAreThoseOfNestedQuadrature) { expect_quantiles_of_quadrature(false); }
+
+TEST(SampledLook, QuantilesAreThoseOfNestedQuadrature) { expect_quantiles_of_quadrature(true); }
 
 }  // namespace
 }  // namespace flash::sysid
