@@ -55,8 +55,9 @@ Posterior posterior_of(const std::vector<Axis>& axes, const WeightedDraws& draws
 Sampled sample_extents(const DensityAbout& density, const Extent& start, const std::vector<double>& at,
                        const std::vector<Axis>& axes, const WeightedDraws* before) {
   constexpr int kRounds = 12;
-  constexpr double kRough = 0.9;      // agreement in a round before the last
-  constexpr double kRoughSize = 100;  // effective size there without a surrogate
+  constexpr double kRough = 0.9;       // agreement in a round before the last
+  constexpr double kRoughDraws = 700;  // effective size there, of a surrogate
+  constexpr double kRoughSize = 100;   // and without one
   const std::vector<Eigen::Index> searched = searched_of(axes);
   Extent extent = start;
   std::vector<double> values = at;
@@ -70,6 +71,7 @@ Sampled sample_extents(const DensityAbout& density, const Extent& start, const s
     SurrogateSettings settings;
     settings.before = before;
     settings.agreement = kRough;
+    settings.enough = kRoughDraws;
     settings.enough_without = kRoughSize;
     sampled.of = sample_by_surrogate(here, low, high, asked, settings);
     const Posterior rough = posterior_of(box, sampled.of.draws);
