@@ -1,5 +1,6 @@
 #include "sim/device_copies.h"
 
+#include <cstdint>
 #include <vector>
 
 #include "data/files/error.h"
@@ -83,5 +84,15 @@ int cuda_device_of_thread() { return -1; }
 void return_to_cuda_device(int) {}
 
 #endif
+
+Tensor DeviceCopies::of(const Tensor& tensor) {
+  std::size_t count = 1;
+  for (const std::int64_t length : tensor.shape) count *= static_cast<std::size_t>(length);
+  Tensor there = tensor;
+  there.data = of(std::span(static_cast<const double*>(tensor.data), count));
+  there.device = Device::cuda;
+  there.device_number = cuda_device();
+  return there;
+}
 
 }  // namespace flash::sim

@@ -3,6 +3,8 @@
 #include <memory>
 #include <span>
 
+#include "sim/tensor.h"
+
 namespace flash::sim {
 
 /// Copies on a CUDA device of numbers of the host, which stay where they are. Throws a DeviceError where the
@@ -16,6 +18,9 @@ class DeviceCopies {
 
   /// The copy of numbers, made when it is first asked for. It stays where it is.
   const double* of(std::span<const double> numbers);
+
+  /// Of all numbers of a dense tensor of the host, as a tensor.
+  Tensor of(const Tensor& tensor);
 
   /// Brings all of them to what the numbers are now. What others have queued on the device's default stream
   /// comes before.

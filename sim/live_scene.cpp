@@ -426,15 +426,7 @@ Tensor LiveScene::status() const {
 }
 
 Tensor LiveScene::on_device(const Tensor& view) const {
-  DeviceCopies* copies = storage_->copies.get();
-  if (copies == nullptr || view.device == Device::cuda) return view;
-  std::size_t count = 1;
-  for (const std::int64_t length : view.shape) count *= static_cast<std::size_t>(length);
-  Tensor there = view;
-  there.data = copies->of({static_cast<const double*>(view.data), count});
-  there.device = Device::cuda;
-  there.device_number = device().cuda_devices.front();
-  return there;
+  return storage_->copies && view.device == Device::cpu ? storage_->copies->of(view) : view;
 }
 
 const std::string& LiveScene::why_lost(int environment) const {

@@ -11,16 +11,6 @@
 namespace flash::sysid {
 namespace {
 
-/// The sampler asks for many points together.
-template <class Function>
-LogDensities each_of(const Function& log_density) {
-  return [=](const Eigen::MatrixXd& points) {
-    Eigen::VectorXd logs(points.rows());
-    for (Eigen::Index i = 0; i < points.rows(); ++i) logs[i] = log_density(points.row(i).transpose());
-    return logs;
-  };
-}
-
 WeightedDraws in_unit_box(const LogDensities& log_densities, Eigen::Index dimensions,
                           const ImportanceSettings& settings = {}) {
   return sample_by_importance(log_densities, Eigen::VectorXd::Zero(dimensions),

@@ -93,4 +93,14 @@ struct Ridge {
   }
 };
 
+/// A log density for samplers, which ask for many points together, a row each.
+template <class Function>
+auto each_of(const Function& log_density) {
+  return [=](const Eigen::MatrixXd& points) {
+    Eigen::VectorXd logs(points.rows());
+    for (Eigen::Index i = 0; i < points.rows(); ++i) logs[i] = log_density(points.row(i).transpose());
+    return logs;
+  };
+}
+
 }  // namespace flash::sysid

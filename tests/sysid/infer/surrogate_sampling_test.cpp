@@ -10,15 +10,6 @@
 namespace flash::sysid {
 namespace {
 
-template <class Function>
-LogDensities each_of(const Function& log_density) {
-  return [=](const Eigen::MatrixXd& points) {
-    Eigen::VectorXd logs(points.rows());
-    for (Eigen::Index i = 0; i < points.rows(); ++i) logs[i] = log_density(points.row(i).transpose());
-    return logs;
-  };
-}
-
 /// Weight of the draws below quantiles, against the exact share: four standard deviations of as many
 /// independent draws as are stated, and what a surrogate that just agrees may be off by. That is its
 /// deviation, sqrt(1 / 0.95 - 1), over the half of the mass that lies on a side at most: 0.23 / 2 of the
