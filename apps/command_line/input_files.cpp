@@ -1,7 +1,6 @@
 #include "apps/command_line/input_files.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -26,26 +25,30 @@ constexpr const char* kSearchFolders[] = {"best", "motions"};
 /// Where the frames of a camera stand, in its folder.
 constexpr const char* kFrameFolders[] = {"", "depth", "clouds", "frames", "masks"};
 
-bool is_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
-
-bool is_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
-
-bool holds_search(const fs::path& folder) {
-  return is_file(folder / "grid.json") || is_file(folder / "summary.json");
-}
-
 bool begins_an_object(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   for (const char mark : {'\xEF', '\xBB', '\xBF'})  // a byte order mark, which readers pass over
     if (file.peek() == std::char_traits<char>::to_int_type(mark)) file.get();
   char first = 0;
   return file >> first && first == '{';  // after white space
+}
+
+/// Whether a document of that name is there which does not say that it is of another kind.
+bool has_document(const fs::path& path, const std::string& schema) {
+  if (!is_file(path)) return false;
+  if (!begins_an_object(path)) return true;
+  try {
+    const nlohmann::json document = data::load_json(path.string());
+    const auto own = document.find("schema");
+    return own != document.end() && own->is_string() && own->get<std::string>().starts_with(schema);
+  } catch (const std::exception&) {
+    return true;  // a broken one
+  }
+}
+
+bool holds_search(const fs::path& folder) {
+  return has_document(folder / "grid.json", "flash-sysid-grid/") ||
+         has_document(folder / "summary.json", "flash-sysid-summary/");
 }
 
 /// What a run reads, as it is reached from the command line.
@@ -61,7 +64,7 @@ class Inputs {
 
  private:
   void add_folder(const fs::path& folder) {
-    const bool recorded = is_file(folder / "recording.json");
+    const bool recorded = holds_recording(folder);
     const bool searched = holds_search(folder);
     if (recorded) add_file(folder / "recording.json");
     if (searched) {
@@ -118,7 +121,9 @@ std::string document_there(const std::string& path) {
   try {
     const nlohmann::json document = data::load_json(path);
     const auto schema = document.find("schema");
-    if (schema == document.end() && document.contains("mechanical_props")) return kIsAsset;  // as published
+    const auto properties = document.find("mechanical_props");
+    if (schema == document.end() && properties != document.end() && properties->is_object())
+      return kIsAsset;  // as published
     if (schema == document.end() || !schema->is_string()) return {};
     for (const auto& [prefix, kind] : kKinds)
       if (schema->get<std::string>().starts_with(prefix)) return kind;
@@ -130,6 +135,16 @@ std::string document_there(const std::string& path) {
 
 }  // namespace
 
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
 std::vector<std::string> input_files(const std::vector<std::string>& values) {
   Inputs inputs;
   for (const std::string& value : values) inputs.add(value);
@@ -140,7 +155,7 @@ std::string input_there(const std::string& path) {
   const fs::path whole = whole_path(path);
   if (!is_file(whole)) return {};
   for (fs::path folder = whole.parent_path();; folder = folder.parent_path()) {
-    if (is_file(folder / "recording.json"))
+    if (holds_recording(folder))
       for (const std::string& file : input_files({(folder / "recording.json").string()}))
         if (whole_path(file) == whole) return "is part of the recording in " + folder.string();
     if (holds_search(folder) && folder == whole.parent_path() &&
@@ -149,6 +164,16 @@ std::string input_there(const std::string& path) {
     if (folder == folder.parent_path()) break;
   }
   return document_there(whole.string());
+}
+
+bool holds_recording(const fs::path& folder) {
+  return has_document(folder / "recording.json", "flash-recording/");
+}
+
+std::string search_of(const fs::path& folder) {
+  const bool of_search = std::find(std::begin(kSearchFolders), std::end(kSearchFolders), folder.filename()) !=
+                         std::end(kSearchFolders);
+  return of_search && holds_search(folder.parent_path()) ? folder.parent_path().string() : std::string();
 }
 
 std::string whole_path(const std::string& path) {

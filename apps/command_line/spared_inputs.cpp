@@ -21,18 +21,10 @@ namespace fs = std::filesystem;
 
 /// Options that name results. Every other one that names a file or a folder that is there names an input.
 const std::set<std::string> kOutputs = {"--out", "--flat", "--truth-out"};
+/// Whose values are words, whatever stands under that name.
+const std::set<std::string> kWords = {"--name", "--device"};
 /// What a search keeps for the next: read and written.
 const std::set<std::string> kKept = {"--rollouts", "--cache"};
-
-bool is_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
-
-bool is_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
 
 bool is_beneath(const std::string& path, const std::string& folder) {
   return path == folder || path.starts_with(folder == "/" ? folder : folder + '/');
@@ -42,13 +34,17 @@ struct CommandLine {
   std::vector<std::string> outputs, inputs;
   std::string out;  ///< the output that may be a folder
   bool resumes = false;
-  bool writes_asset = false;
+  bool writes_asset = false, writes_recording = false;
 };
+
+bool takes_words(const CLI::Option& option) {
+  return kWords.contains(option.get_name()) || option.get_type_name().find(":{") != std::string::npos;
+}
 
 void collect(const CLI::App& app, CommandLine& line) {
   for (const CLI::Option* option : app.get_options()) {
     const std::string name = option->get_name();
-    if (option->count() == 0 || kKept.contains(name)) continue;
+    if (option->count() == 0 || kKept.contains(name) || takes_words(*option)) continue;
     if (name == "--resume") line.resumes = true;
     if (name == "--out") line.out = option->results().front();
     for (const std::string& value : option->results()) {
@@ -59,6 +55,7 @@ void collect(const CLI::App& app, CommandLine& line) {
     }
   }
   if (app.get_name() == "export") line.writes_asset = true;
+  if (app.get_name() == "import" || app.get_name() == "synth") line.writes_recording = true;
   for (const CLI::App* part : app.get_subcommands()) collect(*part, line);  // the verb
   for (const CLI::App* group :
        app.get_subcommands([](const CLI::App* part) { return part->get_name().empty(); }))
@@ -99,10 +96,17 @@ void expect_spared_inputs(const CLI::App& app) {
   std::erase_if(line.outputs, [](const std::string& path) { return !is_file(whole_path(path)); });
   if (line.outputs.empty() && !is_folder(whole_path(line.out)))
     return;  // nothing is there to be written over
-  if (is_folder(whole_path(line.out))) data::expect_not_held(line.out);
+  if (is_folder(whole_path(line.out))) {
+    data::expect_not_held(line.out);
+    if (const std::string search = search_of(whole_path(line.out)); !search.empty())
+      data::expect_not_held(search);
+  }
   const std::vector<std::string> read = input_files(line.inputs);
   expect_own_files(line.outputs, read, replaced);
-  if (is_folder(whole_path(line.out))) check_folder(line.out, read, line.resumes);
+  if (!is_folder(whole_path(line.out))) return;
+  check_folder(line.out, read, line.resumes);
+  if (!line.writes_recording && holds_recording(whole_path(line.out)))
+    throw data::InputError(line.out + ": holds a recording, expected another folder for the result");
 }
 
 }  // namespace flash

@@ -159,7 +159,8 @@ int run(const RunOptions& options) {
     throw data::InputError("--contacts: forces of each contact are told on the CPU alone; use --device cpu");
   begin("reading " + options.scene);
   data::Scene scene = data::load_scene(options.scene);
-  if (options.no_self_contact) scene.self_contact.reset();
+  const bool loses_layers = options.no_self_contact && scene.self_contact;
+  if (loses_layers) scene.self_contact.reset();
   ProgressLine progress(!options.quiet);
   settings.steps = steps_to_run(options, scene);
   settings.contacts = options.contacts;
@@ -168,6 +169,9 @@ int run(const RunOptions& options) {
   settings.notice = [&](const std::string& notice) {
     if (!options.quiet) std::cerr << data::message_line(notice) << '\n';
   };
+  if (loses_layers)
+    settings.notice("--no-self-contact: objects pass through themselves and each other, against " +
+                    options.scene);
   settings.phase = begin;
   settings.progress = [&](int done, int steps) {
     phase.reset();

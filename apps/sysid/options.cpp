@@ -106,8 +106,10 @@ void check_observed(const ReplayOptions& options, const std::vector<data::Record
         if (observes(keyframe, term)) return;
     throw data::InputError(option + ": found no " + term + " in a keyframe of " + recordings.front().source +
                            (recordings.size() > 1 ? " and the other recordings" : "") +
-                           ", expected it of what was observed");
+                           ", expected an option of what was observed");
   };
+  sysid::Objective stated;
+  set_sigmas(options.sigmas, stated);  // which refuses other words
   for (const std::string& sigma : options.sigmas)
     expect("--sigma " + sigma, sigma.substr(0, sigma.find('=')));
   if (options.two_sided) expect("--two-sided", "cloud");

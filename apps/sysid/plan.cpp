@@ -144,7 +144,11 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   check_kind(asset, recordings.front());
   check_options(options.replay, asset, recordings);
   const sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
-  if (!replay.mesh.empty()) recordings.front() = sysid::make_replay(recordings.front(), replay).recording;
+  if (!replay.mesh.empty()) {
+    sysid::ReplaySettings plain = replay;
+    plain.grasp_cell = 0;  // what is simulated is graded towards grasps of its own
+    recordings.front() = sysid::make_replay(recordings.front(), plain).recording;
+  }
   std::vector<std::string> notices;
   sysid::PlanSettings settings;
   const std::vector<sysid::Axis> held = parse_values(options.holds);

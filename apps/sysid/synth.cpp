@@ -159,7 +159,8 @@ int run_twin(const SynthOptions& options) {
   settings.solver.stop = &stop_on_signals();
   settings.mesh = options.mesh;
   settings.element_order = asset.element_order;
-  if (options.common.device.starts_with("cuda"))
+  const std::string& device = options.common.device;
+  if (device != "auto" && sim::choose_device(device).device == sim::Device::cuda)
     throw data::InputError("--device " + options.common.device +
                            ": --like is simulated on the CPU alone; use --device cpu or auto");
   const sysid::Replay replay = sysid::make_replay(recording, settings);

@@ -275,6 +275,21 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
   return best;
 }
 
+namespace {
+
+/// How many times better a reading of so many views has to close than the stated one, beyond what chance
+/// does: the logarithm of the ratio of two deviations, of d degrees of freedom each, has about the deviation
+/// 1 / sqrt(d) (Fisher 1924). The majority has six for each view, and two poses are fitted to it. Three views
+/// that fit are found among any few.
+double least_ratio(std::size_t views, double majority) {
+  constexpr double kDeviations = 3.5;  // 1 in 4,000, for five readings
+  const double agreeing = std::ceil(majority * static_cast<double>(views));
+  if (agreeing < 4) return std::numeric_limits<double>::infinity();
+  return std::exp(kDeviations / std::sqrt(6 * agreeing - 12));
+}
+
+}  // namespace
+
 std::optional<Finding> check_pairing(Setup setup, const std::vector<Observation>& observations,
                                      const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
                                      const ConventionSettings& settings) {
@@ -285,7 +300,9 @@ std::optional<Finding> check_pairing(Setup setup, const std::vector<Observation>
   std::optional<Finding> best;
   for (const Reading& reading : readings) {
     const RobustSeed seed = robust_seed_of(reading, observations, symmetries, settings.robust_seed);
-    if (!seed.found || !(settings.paired * seed.score < stated.score)) continue;
+    const auto views = static_cast<std::size_t>(std::count(reading.known.begin(), reading.known.end(), true));
+    const double better = std::max(settings.paired, least_ratio(views, settings.robust_seed.majority));
+    if (!seed.found || !(better * seed.score < stated.score)) continue;
     if (best && !(seed.score < best->found.score)) continue;
     best = Finding{reading.sentence, stated, seed};
   }

@@ -51,7 +51,7 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
 /// Whether images and poses are paired off by one or two, or in reverse, where the stated reading closes well
 /// enough for check_convention: a robot that is swept regularly moves much alike from view to view, so that a
 /// shift is nearly consistent, and the answer far off. Empty where no such reading closes `paired` times
-/// better.
+/// better, of few views as many times as chance does not.
 std::optional<Finding> check_pairing(Setup setup, const std::vector<Observation>& observations,
                                      const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
                                      const ConventionSettings& settings = {});

@@ -108,6 +108,8 @@ def text(what, value):
         value.encode()
     except UnicodeEncodeError:
         raise ValueError(f"{what}: found {value!r:.60}, half of a character, expected a name that is text") from None
+    if "\0" in value:
+        raise ValueError(f"{what}: found {value!r:.60}, expected a name without a null character")
     return value
 
 

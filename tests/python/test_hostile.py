@@ -121,6 +121,8 @@ def test_what_is_far_or_half_a_character_is_named(sim):
                 call(*words, far)
     with pytest.raises(ValueError, match="^Asset: path: found .*half of a character"):
         flash_sim.Asset("a\ud800.json")
+    with pytest.raises(ValueError, match="^load_config: path: found .*null character"):
+        sim.load_config("scene.json\0.txt")
     with pytest.raises(ValueError, match="^add_ee: name: found .*half of a character"):
         sim.add_ee("\ud800", [0, 0, 1])
 

@@ -54,6 +54,7 @@ def refused(sysid, sim):
             words = [word for word in verbs(sysid)[verb] if word not in ("--bending", "1e-5,1e-4")]
             yield [*words, "--bending", values], ("--bending", said)
     for words in verbs(sysid).values():
+        yield [*words, "--sigma", "CLOUD=0.02"], ('--sigma: "CLOUD=0.02": expected cloud, contour, markers or force',)
         for sigma in UNSEEN:
             yield [*words, "--sigma", sigma], (f"--sigma {sigma}: found no {sigma.split('=')[0]}", "recording/recording.json")
         yield [*words, "--share", "yaw"], ("--share yaw: found one recording",)
@@ -90,6 +91,8 @@ def check_taken(options, work):
     yield done.returncode == 0 and "--asset: areal_density: found 0.3, the search had 0.2" in done.stderr, f"plan: {done.stderr}"
     done = program.call(sysid, "plan", "recording", "--run", "run", "-o", "same.json", cwd=work)
     yield done.returncode == 0 and "the search had" not in done.stderr, f"plan: {done.stderr}"
+    done = program.call(sysid, "plan", "recording", "--asset", "asset.json", "--mesh", "sheet:0.2x0.2:0.05", "-o", "even.json", cwd=work)
+    yield done.returncode == 0, f"plan --mesh without a pattern: {done.stderr}"
     done = program.call(sysid, "replay", "recording", "--asset", "asset.json", "--sigma", "cloud=0.002", "--two-sided",
                         "-o", "overlay", cwd=work)
     yield done.returncode == 0, f"replay: {done.stderr}"

@@ -137,6 +137,7 @@ def check(sysid, folder):
         (("plan", like, "--asset", silicone), "object.mesh: found a solid, expected a sheet"),
         (("replay", like, "--asset", silicone, "--hold", "bending=1"), "found a solid"),
         (("synth", "--asset", silicone, "--marker-noise", "1e-4"), "--like"),
+        (("synth", "--like", like, "--asset", silicone, "--device", "gpu"), '--device: found "gpu"'),
     ]
     for words, message in cases:
         out = folder / "refused"

@@ -46,6 +46,8 @@ def write_inputs(sysid, sim, work):
     (work / "former").mkdir()
     (work / "former/note.txt").write_text("mine")
     (work / "former.json").write_text("{}")
+    (work / "foreign").mkdir()
+    (work / "foreign/recording.json").write_text('{"results": ["tuned.json"]}')
 
 
 def overwrites(sysid, sim):
@@ -99,6 +101,11 @@ def overwrites(sysid, sim):
                 "sheet:0.2x0.2:0.05:alternating"]
     yield [sysid, *imported, "-o", "rec2"], "rec2: holds rec2/"
     yield [sim, "run", "scene.json", "-o", "."], ".: holds scene.json"
+    # A recording that this run does not read.
+    for words in ([sim, "run", "scene.json"], [sysid, "segment", "raw", "--no-table"], [sysid, "replay", "rec2", *asset],
+                  [sysid, "grid", "rec2", *asset, *SEARCH]):
+        for out in ("other", "links/other/"):
+            yield [*words, "-o", out], f"{out}: holds a recording, expected another folder for the result"
     for scene in ("scene.txt", "marked.json"):
         yield [sim, "run", scene, "-o", "holds"], "holds: holds holds/asset.json"
     for words in (["picture", "scan.obj", "-o", "scan.obj"], ["mesh", "scan.obj", "-o", "scan.obj"],
@@ -138,12 +145,17 @@ def check_written(options, work):
                   ["export", "run", "-o", "own.json"],
                   ["report", "run", "-o", "run/report.html"], ["compare", "run", "run2", "-o", "run/comparison.json"],
                   ["replay", "rec2", *asset, "-o", "former"], ["replay", "rec2", *asset, "-o", "rec2/overlay"],
-                  ["synth", *asset, "--duration", "0.2", "-o", "former", "--truth-out", "former/mine.json"]):
+                  ["synth", *asset, "--duration", "0.2", "-o", "former", "--truth-out", "former/mine.json"],
+                  # Words that are a folder's name, and documents of others.
+                  ["synth", *asset, "--duration", "0.2", "--kind", "hang", "-o", "hang"],
+                  ["replay", "rec2", *asset, "--grasp-shape", "point", "-o", "point"],
+                  ["replay", "rec2", *asset, "--device", "cpu", "-o", "cpu"],
+                  ["export", "run", "-o", "foreign/tuned.json"], ["compare", "run", "run2", "-o", "named/summary.json"]):
         for time in range(2):
             force = [] if "--resume" in words else ["--force"]
             done = program.call(sysid, *words, *force, cwd=work)
             yield done.returncode in (0, 3), f"{' '.join(words)}, time {time + 1}: {done.returncode} {done.stderr[-500:]}"
-    for words in (["picture", "scan.obj", "-o", "former.png"], ["run", "scene.json", "-o", "former"]):
+    for words in (["picture", "scan.obj", "-o", "former.png"], ["run", "scene.json", "-o", "ran"]):
         for time in range(2):
             done = program.call(sim, *words, "--force", cwd=work)
             yield done.returncode in (0, 3), f"{' '.join(words)}, time {time + 1}: {done.returncode} {done.stderr[-500:]}"

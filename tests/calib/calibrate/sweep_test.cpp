@@ -37,7 +37,8 @@ Way way_of(Sweep sweep, int i, int n) {
           {0.04 * s, 0, 0.03 * std::cos(h)}};
 }
 
-HandEyeScene swept(Setup setup, Sweep sweep, unsigned seed, int views = 20) {
+/// noise: of the robot, of each coordinate [m]; of angles by 0.17 deg a millimetre.
+HandEyeScene swept(Setup setup, Sweep sweep, unsigned seed, int views = 20, double noise = 3e-4) {
   HandEyeScene scene = make_scene({.setup = setup, .views = 3}, board_points(), seed);
   scene.observations.clear();
   std::mt19937 random(seed);
@@ -52,7 +53,7 @@ HandEyeScene swept(Setup setup, Sweep sweep, unsigned seed, int views = 20) {
     const Eigen::Isometry3d pose = setup == Setup::eye_in_hand ? truth.Z * T.inverse() * truth.X.inverse()
                                                                : truth.X * T * truth.Z.inverse();
     Vector6d error;
-    error << 3e-4 * normal3(), 0.05 * M_PI / 180 * normal3();
+    error << noise * normal3(), noise / 3e-4 * 0.05 * M_PI / 180 * normal3();
     Observation observation;
     observation.T_base_gripper = moved(pose, error);
     observation.image = std::to_string(i) + ".png";
@@ -124,6 +125,16 @@ TEST_P(Sweeps, PairedAsTheyAreAreTaken) {
       EXPECT_EQ(found.said, "");
       EXPECT_LT(found.off_mm, 4);
     }
+}
+
+// Of few views some three agree under any pairing, and a noisy robot makes that look better.
+TEST_P(Sweeps, FewViewsOfANoisyRobotAreNotSaidToBePairedOff) {
+  int said = 0, scenes = 0;
+  for (const int views : {5, 6, 8})
+    for (unsigned seed = 101; seed < 107; ++seed, ++scenes)
+      said += outcome(swept(Setup::eye_in_hand, GetParam(), seed, views, 2e-3))
+                  .said.starts_with("images and poses");
+  EXPECT_EQ(said, 0) << "of " << scenes;
 }
 
 }  // namespace
