@@ -71,7 +71,7 @@ routes: configure-test  ## Say whether every route to an answer gives the same o
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/routes.py --sysid $(sysid) --out $(BUILD)/routes
 
-coverage: configure-test  ## Say whether intervals hold the truth of RUNS twins from SEED on, of KIND corner_lift, lift, drape or bar_pull; ROWS=coverage.json of earlier calls; ALSO=sampled answers each again by importance sampling
+coverage: configure-test  ## Say whether intervals hold the truth of RUNS twins from SEED on, of KIND corner_lift, lift, drape or bar_pull; ROWS=coverage.json of earlier calls; ALSO=sampled answers each again by importance sampling, ALSO=grids on grids
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage_$(KIND) --kind $(KIND) --seed $(SEED) --runs $(RUNS) $(if $(ROWS),--rows $(ROWS)) $(if $(ALSO),--also $(ALSO))
 

@@ -33,7 +33,7 @@ struct GridOptions {
   bool no_solver_check = false;
   bool no_horizon = false;
   bool no_plan = false;
-  bool sampled = false;
+  std::string posterior;  ///< empty: by the number of parameters
   bool resume = false;
   std::string rollouts;
   std::vector<std::string> map;
@@ -135,7 +135,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   sysid::check_job(replays, sysid::count_candidates(settings.axes), memory);
   end_after_signal();
   sysid::Fingerprint print = sysid::fingerprint(replays, settings);
-  if (options.sampled) print["posterior (--sampled)"] = "importance sampling";
+  if (!options.posterior.empty()) print["posterior (--posterior)"] = options.posterior;
   sysid::ResultsStore store(options.out, settings.axes, names_of(recordings), print,
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace
@@ -155,7 +155,9 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
   asked.horizon = !options.no_horizon;
   asked.solver_check = !options.no_solver_check;
-  asked.sampled = options.sampled;
+  if (!options.posterior.empty())
+    asked.posterior =
+        options.posterior == "grids" ? sysid::PosteriorMethod::grids : sysid::PosteriorMethod::sampling;
   Search search{asset, std::move(replays), settings, asked, options.map, options.out, begin};
   search.plan = !options.no_plan;
   return run_search(search, store, options.common);
@@ -184,7 +186,8 @@ void add_grid_verb(CLI::App& app, Action& action) {
                  "Do not solve the estimate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_flag("--no-plan", options->no_plan, "Do not say what to record next, which takes simulations");
-  verb->add_flag("--sampled", options->sampled, "Posteriors by importance sampling in place of grids")
+  verb->add_option("--posterior", options->posterior, "Posteriors on grids, or by importance sampling")
+      ->check(CLI::IsMember({"grids", "sampling"}))
       ->group("");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions, for several searches; without it, motions/ of the run");

@@ -45,15 +45,17 @@ ReplayCandidate extreme_candidate(const GridSettings& settings, bool limpest) {
   return candidate_at(values, settings);
 }
 
+constexpr double kHalved = 8;  // bending whose cells are coarse, over that of half the cells
+
 /// `below`: the bending from which on cells are not coarse [N m].
 std::string coarse_text(const Replay& replay, double below, double least) {
-  const std::string half = scaled_cell(replay.recording.mesh_spec, 0.5);
   return replay.recording.name + ": cells of " + mm(typical_cell(replay.recording.mesh)) +
          " are coarse for the fold in which the sheet leaves the table where bending is below " +
          data::format_short(below) + " N m, and " + data::format_short(least) +
-         " N m is searched: an answer there may be off by a few percent more than is said of it. On half of "
-         "the cells (--mesh " +
-         (half.empty() ? "FILE" : half) + ") that begins below " + data::format_short(below / 8) + " N m";
+         " N m is searched: an answer there is simulated on smaller cells, down to half of these, unless "
+         "--no-solver-check is given. Below " +
+         data::format_short(below / kHalved) +
+         " N m it may still be off by a few percent more than is said of it";
 }
 
 }  // namespace
@@ -91,7 +93,7 @@ KnownBefore known_before(const std::vector<Replay>& replays, const GridSettings&
   for (const Replay& replay : replays) {
     const double below = coarse_below(replay, limpest), least = limpest.material.bending_rigidity;
     if (!(least < below)) continue;
-    const bool all = stiffest.material.bending_rigidity < coarse_below(replay, stiffest);
+    const bool all = kHalved * stiffest.material.bending_rigidity < coarse_below(replay, stiffest);
     (all ? known.warnings : known.notices).push_back(coarse_text(replay, below, least));
   }
   return known;

@@ -17,6 +17,7 @@
 #include "sysid/infer/solution_errors.h"
 #include "sysid/infer/verdict.h"
 #include "sysid/infer/weight_scale.h"
+#include "sysid/replay/coarse_cells.h"
 #include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
@@ -129,8 +130,9 @@ std::vector<Alone> alone_over_all(const Task& task, const Found& found, const Gr
   if (found.emulator.share != own_mesh)
     errors.push_back(to_no_cells(Motions{task.replays, found.estimate.motions},
                                  *found.estimate.errors.front().terms[1].motions));
-  if (reaches_beyond(extent_of(task.ranges), axes)) {
-    // A search that went on from another has its motions about one answer alone.
+  if (reaches_beyond(extent_of(task.ranges), axes) || reaches_beyond(extent_of(axes), found.axes)) {
+    // A search that went on from another has its motions about one answer alone, and so has one whose answer
+    // is of other cells or another grasp.
     const std::vector<Axis> wide = lattice(extent_of(task.ranges), task.ranges, 3, few_motions(task.ranges));
     if (cartesian_product(wide).size() <= many_motions(task.ranges))
       if (const std::optional<Emulator> emulator = emulator_over(task, wide, {}, true))
@@ -229,6 +231,54 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
   return concluded;
 }
 
+/// The look at the motions that a search kept; empty where they do not tell an estimate.
+std::optional<Found> first_look(const Task& task, const std::vector<double>& best,
+                                std::vector<KnownError>& held) {
+  const std::vector<Axis>& axes = task.grid.axes;
+  std::optional<Emulator> emulator;
+  if (task.settings.solver_check)
+    emulator = emulator_over(task, axes, first_on_finer_mesh(axes, task.ranges, best), false);
+  if (!emulator) emulator = emulator_over(task, axes, {}, false);
+  if (!emulator) return std::nullopt;
+  return look_with(task, std::move(*emulator), axes, cells_about(best, axes), best, {}, held);
+}
+
+/// The same without a word of errors of the solution, of cells that the answer is not of. `grid`: that of the
+/// task, of which the centres change.
+std::optional<Found> rough_look(const Task& task, const std::vector<double>& best, GridSettings& grid) {
+  AnswerSettings settings = task.settings;
+  settings.solver_check = false;
+  const std::vector<Replay> nothing_finer;
+  const Task rough{task.replays, nothing_finer, grid, task.ranges, settings, task.store, task.told};
+  std::vector<KnownError> held;
+  std::optional<Found> found = first_look(rough, best, held);
+  if (found) found = about_told_grasp(rough, std::move(*found), grid, held);
+  return found;
+}
+
+/// Where the cells of the search are coarse for the fold in which the sheet leaves the table: motions on
+/// smaller ones about what was found on these, which then take their place in the task. Empty, and everything
+/// as it was, where they are not coarse or a motion diverged.
+std::optional<Found> look_on_cells_for_fold(const Task& task, const std::optional<Found>& rough,
+                                            std::vector<Replay>& replays, std::vector<Replay>& finer,
+                                            std::vector<KnownError>& held, Answer& answer) {
+  if (!rough) return std::nullopt;
+  const std::vector<double> values = rough->look.posterior.values();
+  std::vector<Replay> smaller = on_cells_for_fold(replays, candidate_at(values, task.grid));
+  if (smaller.empty()) return std::nullopt;
+  std::vector<Replay> finer_there = finer_replays(smaller, task.settings);
+  const Task there{smaller, finer_there, task.grid, task.ranges, task.settings, task.store, task.told};
+  std::vector<KnownError> held_there;
+  std::optional<Found> found =
+      look_about(there, extent_of(rough->look.posterior.axes), values, true, {}, held_there);
+  if (!found) return std::nullopt;
+  answer.warnings.push_back(cells_for_fold_text(replays, smaller));
+  replays = std::move(smaller);
+  finer = std::move(finer_there);
+  held = std::move(held_there);
+  return found;
+}
+
 /// Keyframes beyond the time to which a candidate can be predicted lose their weight; warnings say how many.
 void keep_predictable(const std::vector<double>& best, const GridSettings& grid, const MotionStore& store,
                       GridResults& results, std::vector<Replay>& replays, Answer& answer,
@@ -322,18 +372,14 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   const std::vector<Axis> ranges =
       settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
   usable.axes = focused(usable.axes, best);
-  const std::vector<Replay> finer = finer_replays(replays, settings);
+  std::vector<Replay> finer = finer_replays(replays, settings);
   const Task task{replays, finer, usable, ranges, settings, store, told};
-  std::optional<Emulator> emulator;
-  if (settings.solver_check)
-    emulator = emulator_over(task, usable.axes, first_on_finer_mesh(usable.axes, ranges, best), false);
-  if (!emulator) emulator = emulator_over(task, usable.axes, {}, false);
-  std::optional<Found> found;
   std::vector<KnownError> held;
-  if (emulator) {
-    found =
-        look_with(task, std::move(*emulator), usable.axes, cells_about(best, usable.axes), best, {}, held);
-  }
+  std::optional<Found> found;
+  if (settings.solver_check && !on_cells_for_fold(replays, candidate_at(best, usable)).empty())
+    found = look_on_cells_for_fold(task, rough_look(task, best, usable), replays, finer, held, answer);
+  const bool on_search_cells = !found;
+  if (!found) found = first_look(task, best, held);
   if (!found) {
     answer.values = best;
     answer.estimate = results.candidates[static_cast<std::size_t>(answer.best)];
@@ -345,6 +391,9 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     return answer;
   }
   found = about_told_grasp(task, std::move(*found), usable, held);
+  if (settings.solver_check && on_search_cells)
+    if (std::optional<Found> there = look_on_cells_for_fold(task, found, replays, finer, held, answer))
+      found = about_told_grasp(task, std::move(*there), usable, held);
   const std::vector<Alone> alone = alone_over_all(task, *found, results);
   Concluded concluded = conclude(task, std::move(*found), best, held, alone);
   const Found& there = concluded.found;

@@ -15,11 +15,15 @@
 
 namespace flash::sysid {
 
+/// How posteriors are found: on grids of the searched box, or by importance sampling (sampled_look). A grid
+/// of three parameters or more is too coarse for ridges, such as that of bending and friction.
+enum class PosteriorMethod { by_count, grids, sampling };
+
 struct AnswerSettings {
   std::optional<double> repeatability;  ///< trial-to-trial distance of a keyframe [m]
   bool horizon = true;                  ///< drop keyframes beyond the predictable
   bool solver_check = true;             ///< solve the estimate again under finer settings
-  bool sampled = false;                 ///< posteriors by importance sampling (sampled_look), not on grids
+  PosteriorMethod posterior = PosteriorMethod::by_count;  ///< sampling from three searched parameters on
   std::vector<Axis> ranges = {};        ///< searched before the grid at hand; empty: its own
 };
 

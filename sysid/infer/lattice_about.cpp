@@ -21,6 +21,12 @@ std::size_t searched_of(const std::vector<Axis>& axes) {
 }
 
 constexpr std::size_t kMostRefined = 4;  // parameters
+constexpr std::size_t kMostOnGrids = 2;  // parameters: quantiles of a ridge by grids (docs/theory.md)
+
+bool is_sampled(PosteriorMethod method, const std::vector<Axis>& axes) {
+  return method == PosteriorMethod::by_count ? searched_of(axes) > kMostOnGrids
+                                             : method == PosteriorMethod::sampling;
+}
 
 }  // namespace
 
@@ -57,7 +63,7 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
                                const std::optional<WeightedDraws>& before) {
   const auto look = [&](const Extent& start, const std::vector<double>& values,
                         const std::optional<WeightedDraws>& draws) {
-    if (task.settings.sampled)
+    if (is_sampled(task.settings.posterior, task.ranges))
       return sampled_look(emulator, start, values, axes, task.grid, task.settings.repeatability, errors,
                           task.told, draws ? &*draws : nullptr);
     return narrow(emulator, start, values, axes, task.grid, task.settings.repeatability, errors, task.told);

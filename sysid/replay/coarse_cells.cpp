@@ -1,10 +1,12 @@
 #include "sysid/replay/coarse_cells.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "data/files/text.h"
+#include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 
@@ -22,8 +24,6 @@ double typical_cell(const data::TriangleMesh& mesh) {
 
 namespace {
 
-constexpr double kMost = 0.5;  // of the radius
-
 /// That bends the sheet over the edge of its fold, by area; 0 where there is none [N/m^2].
 double weight_on_table(const Replay& replay, const ReplayCandidate& candidate) {
   return candidate.solid || !replay.recording.has_table
@@ -35,30 +35,50 @@ double weight_on_table(const Replay& replay, const ReplayCandidate& candidate) {
 
 double coarse_below(const Replay& replay, const ReplayCandidate& heaviest) {
   const double weight = weight_on_table(replay, heaviest);
-  return weight > 0 ? weight * std::pow(typical_cell(replay.recording.mesh) / kMost, 3) : 0;
+  return weight > 0 ? weight * std::pow(typical_cell(replay.recording.mesh) / most_of_fold, 3) : 0;
 }
 
-std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays,
-                                        const ReplayCandidate& candidate) {
+std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays, const ReplayCandidate& candidate,
+                                        double most) {
   const data::SheetMaterial& material = candidate.material;
   for (const Replay& replay : replays) {
     const double weight = weight_on_table(replay, candidate);
     if (!(weight > 0 && material.bending_rigidity > 0)) continue;
     const CoarseCells cells = {typical_cell(replay.recording.mesh),
                                std::cbrt(material.bending_rigidity / weight)};
-    if (cells.cell > kMost * cells.radius) return cells;
+    if (cells.cell > most * cells.radius) return cells;
   }
   return std::nullopt;
 }
 
+namespace {
+
+std::string mm(double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; }
+
+}  // namespace
+
+std::vector<Replay> on_cells_for_fold(const std::vector<Replay>& replays, const ReplayCandidate& candidate) {
+  constexpr double kOfFold = 0.375, kAsMuch = 1.05;
+  for (const Replay& replay : replays)
+    if (replay.settings.self_contact) return {};
+  const auto coarse = coarse_cells(replays, candidate, kAsMuch * kOfFold);
+  if (!coarse) return {};
+  return on_smaller_cells(replays, std::max(0.5, kOfFold * coarse->radius / coarse->cell));
+}
+
+std::string cells_for_fold_text(const std::vector<Replay>& replays, const std::vector<Replay>& smaller) {
+  return "the answer is simulated on cells of " + mm(typical_cell(smaller.front().recording.mesh)) +
+         ", not on those of " + mm(typical_cell(replays.front().recording.mesh)) +
+         ", for the fold in which the sheet leaves the table";
+}
+
 std::string coarse_cells_text(const CoarseCells& coarse) {
   constexpr double kOfPattern = 1.08;  // typical cell over that of a specification, of right triangles
-  const auto mm = [](double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; };
   return "cells of " + mm(coarse.cell) + " are coarse for a sheet that leaves the table in a fold of about " +
          mm(coarse.radius) +
          ": friction and bending may be off by a few percent more than is said of them. Search on cells "
          "of " +
-         mm(kMost * coarse.radius / kOfPattern);
+         mm(most_of_fold * coarse.radius / kOfPattern);
 }
 
 }  // namespace flash::sysid

@@ -72,6 +72,26 @@ std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays) {
   return halves;
 }
 
+std::vector<Replay> on_smaller_cells(const std::vector<Replay>& replays, double factor) {
+  std::vector<Replay> smaller;
+  for (const Replay& replay : replays) {
+    ReplaySettings settings = replay.settings;
+    settings.mesh = scaled_cell(replay.recording.mesh_spec, factor);
+    const bool anew = !settings.mesh.empty() && replay.recording.start_mesh.empty();
+    if (settings.grasp_cell) *settings.grasp_cell *= anew ? factor : 0.5;
+    if (anew) {
+      smaller.push_back(make_replay(replay, settings));
+      continue;
+    }
+    settings.mesh = replay.settings.mesh;
+    data::Recording halves = replay.recording;
+    halve_cells(halves);
+    for (data::RecordedGrasp& grasp : halves.grasps) grasp.cell *= 0.5;
+    smaller.push_back(on_mesh(replay, std::move(halves), settings));
+  }
+  return smaller;
+}
+
 bool are_graded(const std::vector<Replay>& replays) {
   return std::all_of(replays.begin(), replays.end(),
                      [](const Replay& replay) { return are_graded(replay.recording, replay.settings); });

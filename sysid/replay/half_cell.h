@@ -18,6 +18,10 @@ Replay on_half_the_cell(const Replay& replay);
 
 std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays);
 
+/// The same recordings on smaller cells, those at the grasps smaller by as much: meshed anew by their
+/// specification with its cell times the factor, or all cells of a file halved.
+std::vector<Replay> on_smaller_cells(const std::vector<Replay>& replays, double factor);
+
 /// Replays before and after all cells that are not at the grasps were halved: those at the grasps have the
 /// same size in both.
 struct HalvedSheet {

@@ -285,9 +285,9 @@ def check_resume(options, folder):
     done = program.call(*grid, "--time-step", "0.005")
     yield (done.returncode == REFUSED and "results: time_step_s was 0.01 and is 0.005" in done.stderr,
            f"--resume --time-step: exit code {done.returncode}: {done.stderr}")
-    done = program.call(*grid, "--sampled")
-    yield (done.returncode == REFUSED and "results: posterior (--sampled) was absent and is importance sampling" in done.stderr,
-           f"--resume --sampled: exit code {done.returncode}: {done.stderr}")
+    done = program.call(*grid, "--posterior", "sampling")
+    yield (done.returncode == REFUSED and "results: posterior (--posterior) was absent and is sampling" in done.stderr,
+           f"--resume --posterior: exit code {done.returncode}: {done.stderr}")
     # No permission keeps an administrator out; a folder in the place of the lock does, as a read-only disk would.
     (folder / "begun" / ".lock").unlink()
     (folder / "begun" / ".lock").mkdir()

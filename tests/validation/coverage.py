@@ -75,7 +75,7 @@ KINDS = {
                      {"young": (20, 200, 5), "poisson": (0.05, 0.45, 5)}, ("damping", "weight", "depth", "clock", "diagonals"),
                      ("--hold", "friction=0.3:measured")),
 }
-ALSO = {"sampled": ("--sampled",)}  # other ways to an answer from the same motions, with their options
+ALSO = {"sampled": ("--posterior", "sampling"), "grids": ("--posterior", "grids")}  # other ways to an answer from the same motions, with their options
 TRUTH_STEP = "0.0025"  # of time: a quarter of that of the searches, as cloth takes none [s]
 NORMAL = 1.96  # half width of 95 % over the standard deviation
 WEIGHT, SCALES = 0.2, 0.004  # areal density as weighed and its standard deviation [kg/m^2]
@@ -376,7 +376,7 @@ def main():
     parser.add_argument("--rows", nargs="+", type=pathlib.Path, default=[], metavar="FILE",
                         help="coverage.json of earlier calls of the kind: the tables are of their twins, too; with --runs 0, of them alone")
     parser.add_argument("--also", nargs="+", choices=ALSO, default=[], metavar="WAY",
-                        help="answer each twin again from the same motions, as sampled: by importance sampling. Tables of each way are "
+                        help="answer each twin again from the same motions, sampled: by importance sampling, grids: on grids. Tables of each way are "
                              "of the twins that have both answers, and a line of each")
     options = parser.parse_args()
     kind = KINDS[options.kind]

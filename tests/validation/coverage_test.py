@@ -25,10 +25,10 @@ with open(out.parent / "calls", "a") as calls:
     calls.write(out.name + chr(10))
 if words[0] == "synth":
     (out / "recording.json").write_text(json.dumps({{"nuisance": {{}}, "keyframes": []}}))
-elif (out.parent / "fails").exists() and "--sampled" in words:
+elif (out.parent / "fails").exists() and "sampling" in words:
     sys.exit(2)
 else:
-    width = 2 if "--sampled" in words else 3
+    width = 2 if "sampling" in words else 3
     found = {{"identifiable": "yes", "estimate": 60, "interval95": [60 / width, 60 * width]}}
     parameters = {{name: found for name in ("young", "poisson")}}
     parameters["poisson"] = found | {{"estimate": 0.2, "interval95": [0.25 - width / 10, 0.25 + width / 10]}}

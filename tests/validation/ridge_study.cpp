@@ -2,7 +2,7 @@
 // intervals hold the truth, and at how many points the likelihood is asked for.
 //   ridge_study [WAY [DRAWS [FIRST_SEED [DIMENSIONS]]]]
 // WAY is `exact` (the formula), `grid` (refined grids with splines), `importance` (importance sampling),
-// `surrogate` (of a surrogate, as --sampled has it) or empty: all. A row is of DRAWS truths and data, by
+// `surrogate` (of a surrogate, as sampled_look has it) or empty: all. A row is of DRAWS truths and data, by
 // default 200, of DIMENSIONS parameters, by default of 2 to 6.
 #include <Eigen/Core>
 #include <algorithm>

@@ -30,11 +30,13 @@ TEST(SearchWarnings, CoarseCellsAreToldBeforeASearchOfWhereTheyAre) {
   // A part of the range: the answer may be elsewhere.
   EXPECT_TRUE(known(0.5, 4).warnings.empty());
   ASSERT_EQ(known(0.5, 4).notices.size(), 1u);
-  EXPECT_NE(known(0.5, 4).notices[0].find("On half of the cells (--mesh sheet:0.2x0.2:0.02)"),
+  EXPECT_NE(known(0.5, 4).notices[0].find("simulated on smaller cells, down to half of these"),
             std::string::npos)
       << known(0.5, 4).notices[0];
-  EXPECT_TRUE(known(0.5, 0.9).notices.empty());
-  EXPECT_EQ(known(0.5, 0.9).warnings.size(), 1u);
+  EXPECT_EQ(known(0.5, 0.9).notices.size(), 1u);
+  // All of it is below what half of the cells take.
+  EXPECT_TRUE(known(0.05, 0.12).notices.empty());
+  EXPECT_EQ(known(0.05, 0.12).warnings.size(), 1u);
 }
 
 TEST(SearchWarnings, AnEstimateToGoOnFromIsTheWholeRange) {

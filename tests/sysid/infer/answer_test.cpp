@@ -25,7 +25,7 @@ AnswerSettings without_horizon() {
   return settings;
 }
 
-void expect_the_same_on_any_threads(bool sampled) {
+void expect_the_same_on_any_threads(PosteriorMethod method) {
   const data::TemporaryFolder folder;
   GridSettings grid = bending_grid();
   grid.axes.push_back(parse_axis("friction", "0.1:0.6:4"));
@@ -35,7 +35,7 @@ void expect_the_same_on_any_threads(bool sampled) {
   ASSERT_TRUE(grid_search(replays, grid, store));
   AnswerSettings asked = without_horizon();
   asked.solver_check = false;
-  asked.sampled = sampled;
+  asked.posterior = method;
   const auto answer = [&](int threads) {
     GridResults results = store.results();
     grid.threads = replays[0].settings.threads = threads;
@@ -60,9 +60,9 @@ void expect_the_same_on_any_threads(bool sampled) {
   EXPECT_EQ(one.open_information, four.open_information);
 }
 
-TEST(Answer, IsTheSameOnAnyThreads) { expect_the_same_on_any_threads(false); }
+TEST(Answer, IsTheSameOnAnyThreads) { expect_the_same_on_any_threads(PosteriorMethod::grids); }
 
-TEST(Answer, IsTheSameOnAnyThreadsWhereItIsSampled) { expect_the_same_on_any_threads(true); }
+TEST(Answer, IsTheSameOnAnyThreadsWhereItIsSampled) { expect_the_same_on_any_threads(PosteriorMethod::sampling); }
 
 TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   const data::TemporaryFolder folder;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "data/mesh/mesh_io.h"
 #include "data/mesh/procedural_mesh.h"
 #include "tests/sysid/short_lift.h"
 
@@ -29,6 +30,41 @@ TEST(CoarseCells, AreToldWhereTheFoldIsNotFarLarger) {
   EXPECT_NE(with_radius(0.99 * cell / 0.5).find("cells of 26.9 mm are coarse"), std::string::npos)
       << with_radius(0.99 * cell / 0.5);
   EXPECT_EQ(with_radius(0), "");
+}
+
+TEST(CoarseCells, OfAnAnswerTakeThreeEighthsOfTheFold) {
+  const data::TemporaryFolder folder;
+  const Replay recorded = short_corner_lift(folder, 0.2);
+  ReplaySettings of_file = recorded.settings, as_made = recorded.settings;
+  as_made.mesh = "sheet:0.2x0.2:0.015";
+  const Replay made = make_replay(recorded, as_made);  // graded
+  data::save_triangle_mesh(made.recording.mesh, folder / "towel.obj");
+  of_file.mesh = folder / "towel.obj";
+  ReplayCandidate candidate;
+  candidate.material.areal_density = 0.2;
+  for (const Replay& replay : {made, make_replay(recorded, of_file)}) {
+    const double cell = typical_cell(replay.recording.mesh);
+    // Cells of the answer over those of the search; 0: they are the same.
+    const auto smaller = [&](double radius) {
+      candidate.material.bending_rigidity = 0.2 * 9.81 * radius * radius * radius;
+      const std::vector<Replay> on = on_cells_for_fold({replay}, candidate);
+      return on.empty() ? 0 : typical_cell(on.front().recording.mesh) / cell;
+    };
+    EXPECT_EQ(smaller(cell / 0.37), 0);
+    const bool is_file = replay.settings.mesh == of_file.mesh;
+    EXPECT_NEAR(smaller(cell / 0.5), is_file ? 0.5 : 0.75, 0.08);
+    EXPECT_NEAR(smaller(cell / 2), 0.5, 0.05);  // no smaller than that
+  }
+}
+
+TEST(CoarseCells, OfAnAnswerKeepTheLayersOfASheetThatMeetsItself) {
+  const data::TemporaryFolder folder;
+  Replay replay = short_corner_lift(folder, 0.2);
+  replay.settings.self_contact = sim::SelfContact{.thickness = 1e-3};
+  ReplayCandidate candidate;
+  candidate.material.areal_density = 0.2;
+  candidate.material.bending_rigidity = 1e-6;
+  EXPECT_TRUE(on_cells_for_fold({replay}, candidate).empty());
 }
 
 }  // namespace
