@@ -245,33 +245,43 @@ std::optional<Found> first_look(const Task& task, const std::vector<double>& bes
 
 /// The same without a word of errors of the solution, of cells that the answer is not of. `grid`: that of the
 /// task, of which the centres change.
-std::optional<Found> rough_look(const Task& task, const std::vector<double>& best, GridSettings& grid) {
+std::optional<Found> rough_look(const Task& task, const std::vector<double>& best, GridSettings& grid,
+                                std::vector<KnownError>& held) {
   AnswerSettings settings = task.settings;
   settings.solver_check = false;
   const std::vector<Replay> nothing_finer;
   const Task rough{task.replays, nothing_finer, grid, task.ranges, settings, task.store, task.told};
-  std::vector<KnownError> held;
   std::optional<Found> found = first_look(rough, best, held);
   if (found) found = about_told_grasp(rough, std::move(*found), grid, held);
   return found;
 }
 
+/// What the estimate of a look leaves of each recording.
+std::vector<LeftResiduals> left_by(const Task& task, const Found& found,
+                                   const std::vector<KnownError>& held) {
+  return left_residuals(likelihood_about(task, found, task.replays, found.look.posterior.values(),
+                                         found.estimate.motions, held));
+}
+
 /// Where the cells of the search are coarse for the fold in which the sheet leaves the table: motions on
-/// smaller ones about what was found on these, which then take their place in the task. Empty, and everything
-/// as it was, where they are not coarse or a motion diverged.
-std::optional<Found> look_on_cells_for_fold(const Task& task, const std::optional<Found>& rough,
+/// smaller ones about a `rough` look at these, whose errors are `held`. Replays and errors of the smaller
+/// ones take their place. Empty, and all as it was, where cells are not coarse, a motion diverged, or the
+/// recording is of the coarse cells themselves, as one that was simulated on them.
+std::optional<Found> look_on_cells_for_fold(const Task& task, const Found& rough,
                                             std::vector<Replay>& replays, std::vector<Replay>& finer,
                                             std::vector<KnownError>& held, Answer& answer) {
-  if (!rough) return std::nullopt;
-  const std::vector<double> values = rough->look.posterior.values();
+  constexpr double kSure = 9;  // of a deviance: three standard deviations
+  const std::vector<double> values = rough.look.posterior.values();
   std::vector<Replay> smaller = on_cells_for_fold(replays, candidate_at(values, task.grid));
   if (smaller.empty()) return std::nullopt;
   std::vector<Replay> finer_there = finer_replays(smaller, task.settings);
   const Task there{smaller, finer_there, task.grid, task.ranges, task.settings, task.store, task.told};
   std::vector<KnownError> held_there;
   std::optional<Found> found =
-      look_about(there, extent_of(rough->look.posterior.axes), values, true, {}, held_there);
-  if (!found) return std::nullopt;
+      look_about(there, extent_of(rough.look.posterior.axes), values, true, {}, held_there);
+  if (!found || excess_deviance(left_by(task, rough, held), left_by(there, *found, held_there),
+                                task.settings.repeatability) > kSure)
+    return std::nullopt;
   answer.warnings.push_back(cells_for_fold_text(replays, smaller));
   replays = std::move(smaller);
   finer = std::move(finer_there);
@@ -375,10 +385,18 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   std::vector<Replay> finer = finer_replays(replays, settings);
   const Task task{replays, finer, usable, ranges, settings, store, told};
   std::vector<KnownError> held;
-  std::optional<Found> found;
-  if (settings.solver_check && !on_cells_for_fold(replays, candidate_at(best, usable)).empty())
-    found = look_on_cells_for_fold(task, rough_look(task, best, usable), replays, finer, held, answer);
-  const bool on_search_cells = !found;
+  bool tried = !settings.solver_check;
+  const auto look_on_smaller_cells = [&](const std::vector<double>& values) -> std::optional<Found> {
+    if (tried || on_cells_for_fold(replays, candidate_at(values, usable)).empty()) return std::nullopt;
+    tried = true;
+    std::vector<KnownError> errors;
+    const std::optional<Found> rough = rough_look(task, best, usable, errors);
+    if (!rough) return std::nullopt;
+    std::optional<Found> there = look_on_cells_for_fold(task, *rough, replays, finer, errors, answer);
+    if (there) held = std::move(errors);
+    return there;
+  };
+  std::optional<Found> found = look_on_smaller_cells(best);
   if (!found) found = first_look(task, best, held);
   if (!found) {
     answer.values = best;
@@ -391,9 +409,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     return answer;
   }
   found = about_told_grasp(task, std::move(*found), usable, held);
-  if (settings.solver_check && on_search_cells)
-    if (std::optional<Found> there = look_on_cells_for_fold(task, found, replays, finer, held, answer))
-      found = about_told_grasp(task, std::move(*there), usable, held);
+  if (std::optional<Found> there = look_on_smaller_cells(found->look.posterior.values()))
+    found = about_told_grasp(task, std::move(*there), usable, held);
   const std::vector<Alone> alone = alone_over_all(task, *found, results);
   Concluded concluded = conclude(task, std::move(*found), best, held, alone);
   const Found& there = concluded.found;
@@ -404,11 +421,10 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer = std::move(concluded.answer);
   const CandidateResult& nearest = results.candidates[static_cast<std::size_t>(answer.best)];
   if (answer.estimate.score > kFarther * nearest.score)
-    answer.warnings.push_back(
-        "the best candidate misses the cloth by " + millimetres(nearest.score) + ", the estimate by " +
-        millimetres(answer.estimate.score) +
-        " on the same mesh: errors of the cells, of the step and of what is held decide "
-        "between them; search on a finer mesh, with a shorter step, or what is held too");
+    answer.warnings.push_back("the best candidate misses the cloth by " + millimetres(nearest.score) +
+                              ", the estimate by " + millimetres(answer.estimate.score) +
+                              ": errors of the cells, of the step and of what is held decide between them; "
+                              "search on a finer mesh, with a shorter step, or what is held too");
   warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
   if (there.look.draws && !there.look.draws->enough)
     answer.warnings.push_back(

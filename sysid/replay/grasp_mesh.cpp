@@ -186,6 +186,9 @@ void fit_rows(const ReplaySettings& settings, data::Recording& recording) {
   start_as_at_rest(recording);
 }
 
+/// Whether a patch reaches across a side, but for rounding [m].
+bool spans(double within, double side) { return within >= (1 - 1e-9) * side; }
+
 /// Whether a specification is of a rectangle and names how its cells are cut.
 bool names_pattern(const std::string& mesh) {
   return !mesh.starts_with("sheet:") || data::split(mesh, ":").size() > 3;
@@ -275,7 +278,7 @@ std::optional<double> grasp_size(const data::Recording& recording, const ReplayS
   const Eigen::RowVector3d sides =
       recording.mesh.vertices.colwise().maxCoeff() - recording.mesh.vertices.colwise().minCoeff();
   for (const data::RecordedGrasp& grasp : recording.grasps)
-    if (has_grasp_size(grasp, settings) && size_of_patch(grasp, settings) < sides.head<2>().minCoeff())
+    if (has_grasp_size(grasp, settings) && !spans(size_of_patch(grasp, settings), sides.head<2>().minCoeff()))
       return size_of_patch(grasp, settings);
   return std::nullopt;
 }
@@ -288,7 +291,7 @@ void resize_grasps(double size, ReplaySettings& settings, data::Recording& recor
     const RestCorner corner = rest_corner(rest, *grasp.select.corner);
     const double was = size_of_patch(grasp, settings);
     for (int axis = 0; axis < 2; ++axis) {
-      if (was > sides[axis]) continue;  // across a whole strip
+      if (spans(was, sides[axis])) continue;  // across a whole strip
       const double reach = std::min(3 * std::max(was, size), sides[axis]);
       if (!(std::max(was, size) < 0.9 * reach))
         throw data::InputError("grasp_size: found " + data::format_short(size) + " m, expected less than " +

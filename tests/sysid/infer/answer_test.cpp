@@ -7,6 +7,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "sysid/replay/coarse_cells.h"
 #include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {
@@ -62,7 +63,9 @@ void expect_the_same_on_any_threads(PosteriorMethod method) {
 
 TEST(Answer, IsTheSameOnAnyThreads) { expect_the_same_on_any_threads(PosteriorMethod::grids); }
 
-TEST(Answer, IsTheSameOnAnyThreadsWhereItIsSampled) { expect_the_same_on_any_threads(PosteriorMethod::sampling); }
+TEST(Answer, IsTheSameOnAnyThreadsWhereItIsSampled) {
+  expect_the_same_on_any_threads(PosteriorMethod::sampling);
+}
 
 TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   const data::TemporaryFolder folder;
@@ -99,6 +102,37 @@ TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   EXPECT_EQ(answer.values.front(), *bending.estimate);
   EXPECT_EQ(bending.values.front(), grid.axes[0].values.front());
   EXPECT_EQ(bending.values.back(), grid.axes[0].values.back());
+}
+
+// A strip that bends over its own length of 34 mm, searched on cells of 25 mm.
+TEST(Answer, IsOfCellsForTheFoldUnlessTheRecordingIsOfCoarseOnes) {
+  const data::TemporaryFolder folder;
+  data::SheetMaterial limp = short_lift_material();
+  limp.bending_rigidity = 8e-5;
+  const std::string coarse = "sheet:0.2x0.05:0.025:alternating";
+  const auto answered_on = [&](const std::string& made_on) {  // cells over those of the search
+    std::vector<Replay> replays = {short_lift(folder, made_on, limp)};
+    ReplaySettings settings = replays[0].settings;
+    settings.mesh = coarse;
+    replays[0] = make_replay(replays[0].recording, settings);
+    const double cell = typical_cell(replays[0].recording.mesh);
+    GridSettings grid = bending_grid();
+    grid.rollouts = folder / "rollouts";
+    const data::TemporaryFolder run;
+    ResultsStore store(run / "run", grid.axes, {"lift"}, {}, Existing::refuse);
+    EXPECT_TRUE(grid_search(replays, grid, store));
+    GridResults results = store.results();
+    const Answer answer = find_answer(results, replays, grid, without_horizon());
+    const double share = typical_cell(replays[0].recording.mesh) / cell;
+    const bool told = std::any_of(answer.warnings.begin(), answer.warnings.end(), [](const auto& warning) {
+      return warning.find("the answer is simulated on cells of") != std::string::npos;
+    });
+    EXPECT_EQ(told, share < 1);
+    EXPECT_NEAR(answer.values.front(), 8e-5, 0.25 * 8e-5) << made_on;
+    return share;
+  };
+  EXPECT_LT(answered_on("sheet:0.2x0.05:0.0041666667:alternating"), 0.8);
+  EXPECT_EQ(answered_on(coarse), 1);
 }
 
 // Thickness is a power of two, so that not even rounding tells E and E t apart.
