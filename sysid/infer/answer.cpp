@@ -390,10 +390,14 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     if (tried || on_cells_for_fold(replays, candidate_at(values, usable)).empty()) return std::nullopt;
     tried = true;
     std::vector<KnownError> errors;
-    const std::optional<Found> rough = rough_look(task, best, usable, errors);
-    if (!rough) return std::nullopt;
-    std::optional<Found> there = look_on_cells_for_fold(task, *rough, replays, finer, errors, answer);
-    if (there) held = std::move(errors);
+    const std::vector<Axis> centres = usable.centres;
+    std::optional<Found> there;
+    if (const std::optional<Found> rough = rough_look(task, best, usable, errors))
+      there = look_on_cells_for_fold(task, *rough, replays, finer, errors, answer);
+    if (there)
+      held = std::move(errors);
+    else
+      usable.centres = centres;
     return there;
   };
   std::optional<Found> found = look_on_smaller_cells(best);

@@ -74,21 +74,20 @@ Sampled sample_extents(const DensityAbout& density, const Extent& start, const s
     settings.enough = kRoughDraws;
     settings.enough_without = kRoughSize;
     sampled.of = sample_by_surrogate(here, low, high, asked, settings);
-    const Posterior rough = posterior_of(box, sampled.of.draws);
-    const Extent next = next_extent(extent, rough, axes);
-    const bool last = next == extent || round == kRounds;
-    if (last) {
+    sampled.posterior = posterior_of(box, sampled.of.draws);
+    Extent next = next_extent(extent, sampled.posterior, axes);
+    const auto keeps = [&] { return next == extent || round == kRounds; };
+    if (keeps()) {
       rough_draws = std::move(sampled.of.draws);
       settings = {};
       settings.before = &rough_draws;
       sampled.of = sample_by_surrogate(here, low, high, asked, settings);
+      sampled.posterior = posterior_of(box, sampled.of.draws);
+      next = next_extent(extent, sampled.posterior, axes);  // more draws may find an end likely
     }
     sampled.asked += static_cast<int>(asked.size());
-    if (last) {
-      sampled.posterior = posterior_of(box, sampled.of.draws);
-      return sampled;
-    }
-    values = rough.values();
+    if (keeps()) return sampled;
+    values = sampled.posterior.values();
     extent = next;
     rough_draws = std::move(sampled.of.draws);
     before = &rough_draws;
