@@ -16,6 +16,7 @@
 #include "data/files/text.h"
 #include "data/files/writable.h"
 #include "data/mesh/mesh_io.h"
+#include "data/mesh/procedural_mesh.h"
 #include "data/recording/recording_digest.h"
 #include "sim/newton/accepted.h"
 #include "sysid/observe/horizon.h"
@@ -145,6 +146,14 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   simulated.device = device.device;
   simulated.cuda_devices = device.cuda_devices;
   simulated.element_order = asset.element_order;
+  const std::optional<sysid::IdentifiedRecording> identified =
+      sysid::identified_recording(asset, data::recording_sha256(recording));
+  if (identified && simulated.mesh.empty() && identified->mesh != recording.mesh_spec &&
+      data::is_made_on_the_spot(identified->mesh)) {
+    simulated.mesh = identified->mesh;
+    say(options.common, recording.name + ": the mesh is " + identified->mesh +
+                            ", that of the answer behind the asset; --mesh replaces that");
+  }
   sysid::Replay replay = sysid::make_replay(recording, simulated);
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
@@ -164,8 +173,6 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   for (const std::string& line : sysid::unlike_the_search(asset, sysid::settings_texts({replay}, grid), axes))
     warn(line);
 
-  const std::optional<sysid::IdentifiedRecording> identified =
-      sysid::identified_recording(asset, data::recording_sha256(recording));
   if (identified && !options.no_horizon) keep_predictable(*identified, options.common, replay);
 
   sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);

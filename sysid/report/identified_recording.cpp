@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "data/files/text.h"
+#include "sysid/report/summary.h"
 
 namespace flash::sysid {
 namespace {
@@ -25,6 +26,9 @@ std::optional<IdentifiedRecording> identified_recording(const data::Asset& asset
     if (!recording.is_object() || recording.value("sha256", nlohmann::json()) != sha256) continue;
     IdentifiedRecording found{number_of(recording, "horizon_s"), number_of(recording, "score_m"),
                               number_of(recording, "grasp_size_m")};
+    if (const nlohmann::json solver = of("solver"); solver.is_object() && solver.contains("mesh"))
+      if (const nlohmann::json& mesh = solver["mesh"]; mesh.is_string())
+        found.mesh = mesh_of_text(mesh.get<std::string>());
     if (recordings.size() == 1) {  // earlier programs kept what all have in common
       if (!found.horizon_s) found.horizon_s = number_of(identification, "horizon_s");
       if (!found.score) found.score = number_of(identification, "score_m");

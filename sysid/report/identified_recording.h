@@ -12,6 +12,7 @@ struct IdentifiedRecording {
   std::optional<double> horizon_s;      ///< keyframes from here on carried no weight [s]
   std::optional<double> score;          ///< of the estimate on the mesh that was searched [m]
   std::optional<double> grasp_size;     ///< that the estimate has [m]
+  std::string mesh{};                   ///< on which the answer was simulated; empty: not known
   std::vector<std::string> not_told{};  ///< searched parameters of which the asset has not the estimate
 };
 

@@ -250,9 +250,11 @@ double duration_of(const SummaryRecording& recording) {
 }
 
 std::string mesh_of(const Summary& summary) {
-  const auto mesh = summary.settings.find("mesh");  // "sheet:0.2x0.2:0.02 (121 vertices)"
-  return mesh == summary.settings.end() ? "" : mesh->second.substr(0, mesh->second.rfind(" ("));
+  const auto mesh = summary.settings.find("mesh");
+  return mesh == summary.settings.end() ? "" : mesh_of_text(mesh->second);
 }
+
+std::string mesh_of_text(const std::string& text) { return text.substr(0, text.rfind(" (")); }
 
 bool model_fits(const SummaryRecording& recording) {
   constexpr double kTold = 1e-5;  // [m]

@@ -103,6 +103,9 @@ struct Summary {
 /// The specification of the mesh that was searched, or its file; empty where an earlier program did not say.
 std::string mesh_of(const Summary& summary);
 
+/// "sheet:0.2x0.2:0.02" of "sheet:0.2x0.2:0.02 (121 vertices)".
+std::string mesh_of_text(const std::string& text);
+
 /// The text of summary.json. Its last field, `digest`, covers the others: 16 digits of a SHA-256.
 std::string summary_text(const Summary& summary);
 

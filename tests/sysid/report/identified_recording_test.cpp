@@ -31,6 +31,7 @@ TEST(IdentifiedRecording, IsWhatTheSearchWeighedAndHowItScored) {
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->horizon_s, 1.9);
   EXPECT_EQ(first->score, 0.0045);
+  EXPECT_EQ(first->mesh, mesh_of(summary));
   EXPECT_FALSE(second->horizon_s);  // each has its own
   EXPECT_EQ(second->score, 0.003);
   EXPECT_FALSE(identified_recording(asset, std::string(64, 'c')));
