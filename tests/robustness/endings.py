@@ -452,12 +452,12 @@ def check_tuned(options, folder):
     program.must(options.sysid, "export", run, "--asset", asset, "--quiet", "-o", tuned)
     score = json.loads(tuned.read_text())["identification"]["score_m"]
     replay = [options.sysid, "replay", recording, "--asset", tuned, "--json", "--force", "-o", folder / "of_tuned"]
-    mesh = ["--mesh", "sheet:0.2x0.2:0.025:alternating"]
-    done = program.must(*replay, *mesh)
-    found = json.loads(done.stdout)["score"]
-    yield abs(found - score) <= 1e-9, f"replay of the tuned asset: score {found}, the asset has {score}"
-    yield "the search behind the asset had" not in done.stderr, f"replay as searched: {done.stderr}"
-    done = program.must(*replay)
+    for mesh in ([], ["--mesh", "sheet:0.2x0.2:0.025:alternating"]):  # of the search, whether it is given or not
+        done = program.must(*replay, *mesh)
+        found = json.loads(done.stdout)["score"]
+        yield abs(found - score) <= 1e-9, f"replay of the tuned asset {mesh}: score {found}, the asset has {score}"
+        yield "the search behind the asset had" not in done.stderr, f"replay as searched {mesh}: {done.stderr}"
+    done = program.must(*replay, "--mesh", "sheet:0.2x0.2:0.0125:alternating")
     yield ("--mesh: found sheet:0.2x0.2:0.0125:alternating (289 vertices), the search behind the asset had sheet:0.2x0.2:0.025:alternating" in done.stderr,
            f"replay on another mesh: {done.stderr}")
     done = program.must(*replay, *mesh, "--grasp-shape", "point", "--time-step", "0.005")
