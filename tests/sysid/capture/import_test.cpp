@@ -214,15 +214,26 @@ TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
     set_sheet("sheet:" + sheet + ":0.02", settings_);
     settings_.grasp.corner = corner;
     for (const std::string& notice : import_recording(settings_).notices)
-      if (notice.find("--mesh") != std::string::npos) return notice;
+      if (notice.find("--mesh says") != std::string::npos) return notice;
     return std::string();
   };
   EXPECT_EQ(told("0.2x0.3", {0, 0}), "");
   EXPECT_EQ(told("0.2x0.3", {1, 1}), "");
   EXPECT_EQ(told("0.3x0.2", {1, 0}), "");
-  EXPECT_NE(told("0.3x0.2", {0, 0}).find("--mesh: with the sides changed over, 0.2x0.3, the sheet is"),
+  EXPECT_NE(told("0.3x0.2", {0, 0}).find("swap the sides, --mesh sheet:0.2x0.3:0.02, or name"),
             std::string::npos);
   EXPECT_NE(told("0.2x0.3", {0, 1}), "");
+  // Where the heading is known, they are refused, and accepted with a warning.
+  settings_.heading = std::atan2(0.2, -0.3);
+  EXPECT_EQ(told("0.2x0.3", {0, 0}), "");
+  EXPECT_TRUE(
+      data::input_error_of([&] {
+        told("0.3x0.2", {0, 0});
+      })
+          .starts_with("import: the cloth lies with 200 mm on the right hand of its diagonal and 300 mm "
+                       "on the left, and --mesh says 300 mm and 200 mm"));
+  settings_.accept_unusable = true;
+  EXPECT_NE(told("0.3x0.2", {0, 0}), "");
 }
 
 TEST_F(ImportFiles, TheMiddleOfThePatchCanBeAtTheTool) {
