@@ -299,6 +299,31 @@ TEST_F(SegmentFolder, CamerasAndGrippersOfOtherCellsAreRefusedAndTheMistakeIsNam
             std::string::npos);
 }
 
+TEST_F(SegmentFolder, AMistakeThatHidesTheTableIsNamedWhetherOneIsSoughtOrStated) {
+  write_depth_view(folder("raw"), {0.1, 0.2, 0.3});
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches({0.1, 0.2, 0.3});
+  const RawView view = open_raw_view(folder("raw"));
+  const auto message_with = [&](const RawView& other) {
+    return message_of([&] { segment_folder({other}, {0, 0.1, 0.2}, settings, folder("out")); });
+  };
+  // Half a turn about x + y looks down too; its quaternion as w x y z makes the camera look along y.
+  RawView other = view;
+  other.base_from_camera.linear() =
+      Eigen::Quaterniond(0, 0, std::sqrt(0.5), std::sqrt(0.5)).toRotationMatrix();
+  const std::string quaternion = ". It would be one if the quaternion of the camera is w x y z";
+  EXPECT_NE(message_with(other).find("no table that stands still is seen across the vertical" + quaternion),
+            std::string::npos)
+      << message_with(other);
+  settings.table_height = 0.07;
+  EXPECT_EQ(message_with(view), "no error");
+  settings.gripper.reset();  // which would be far from what is seen
+  EXPECT_NE(message_with(other).find("no plane is seen at --table-z 0.07" + quaternion), std::string::npos)
+      << message_with(other);
+  settings.table_height = -0.3;  // of a table that is not in view
+  EXPECT_EQ(message_with(view), "no error");
+}
+
 TEST_F(SegmentFolder, AWallThatIsLargerThanTheClothIsNotTheCloth) {
   const std::vector<double> heights = {0.1, 0.15, 0.2, 0.25, 0.3};
   write_depth_view(folder("raw"), heights);
