@@ -152,6 +152,28 @@ std::vector<PoseMistake> usual_poses() {
            }}};
 }
 
+// Of depth images whose counts are no metres by themselves.
+std::vector<PoseMistake> usual_scales(const std::vector<RawView>& views) {
+  std::vector<PoseMistake> mistakes;
+  for (const double scale : {1e-3, 1e-4, 2.5e-4, 2e-4, 1e-2, 1.0}) {
+    const auto is_other = [scale](const RawView& view) {
+      return view.camera && data::lower_extension(view.files.front()) == ".png" &&
+             std::abs(view.depth_scale - scale) > 1e-6 * scale;
+    };
+    if (std::any_of(views.begin(), views.end(), is_other))
+      mistakes.push_back(
+          {"a count of the depth images is " + data::format_short(scale) + " m (--depth-scale " +
+               data::format_short(scale) + "), where " +
+               data::format_short(std::find_if(views.begin(), views.end(), is_other)->depth_scale) +
+               " m is taken",
+           [is_other, scale](CellPoses& poses) {
+             for (RawView& view : poses.views)
+               if (is_other(view)) view.depth_scale = scale;
+           }});
+  }
+  return mistakes;
+}
+
 double lowest_over(const TablePlane& table, const std::vector<CellFrame>& frames) {
   double lowest = INFINITY;
   for (const CellFrame& frame : frames)
@@ -180,7 +202,8 @@ std::optional<FoundTable> seen_table(const std::vector<CellFrame>& frames,
 // `seen`: only such ones count.
 std::string suspected_mistake(const std::vector<RawView>& views, const std::vector<double>& times,
                               const SegmentFolderSettings& settings, bool seen) {
-  const std::vector<PoseMistake> mistakes = usual_poses();
+  std::vector<PoseMistake> mistakes = usual_poses();
+  for (PoseMistake& mistake : usual_scales(views)) mistakes.push_back(std::move(mistake));
   std::string with_table, without_table;
   double least = INFINITY;
   for (const PoseMistake& mistake : mistakes) {

@@ -324,6 +324,24 @@ TEST_F(SegmentFolder, AMistakeThatHidesTheTableIsNamedWhetherOneIsSoughtOrStated
   EXPECT_EQ(message_with(view), "no error");
 }
 
+TEST_F(SegmentFolder, AnotherDepthScaleIsNamedWhereItMakesACell) {
+  write_depth_view(folder("raw"), {0.1, 0.2, 0.3});
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches({0.1, 0.2, 0.3});
+  for (const bool table : {true, false})
+    for (const double scale : {1e-4, 2e-4, 2.5e-4, 1e-2}) {
+      RawView view = open_raw_view(folder("raw"));
+      view.depth_scale = scale;
+      settings.table_height = table ? std::nullopt : std::optional(0.07);
+      const std::string said = message_of([&] {
+        segment_folder({view}, {0, 0.1, 0.2}, settings, folder("out"));
+      });
+      EXPECT_NE(said.find("It would be one if a count of the depth images is 0.001 m (--depth-scale 0.001)"),
+                std::string::npos)
+          << scale << ' ' << said;
+    }
+}
+
 TEST_F(SegmentFolder, AWallThatIsLargerThanTheClothIsNotTheCloth) {
   const std::vector<double> heights = {0.1, 0.15, 0.2, 0.25, 0.3};
   write_depth_view(folder("raw"), heights);
