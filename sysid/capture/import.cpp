@@ -260,6 +260,7 @@ data::Recording import_recording(const ImportSettings& settings) {
                           ? "; or the table's height, guessed as " + data::format_short(table_height) +
                                 " m from the gripper's start and the crop, is wrong: give it as --table-z"
                           : "";
+  if (const std::string flange = flange_doubt(recording); corner && !flange.empty()) doubt += "; " + flange;
   if (const std::string approach = approach_of(trajectory); corner && !approach.empty())
     doubt += "; " + approach;
   data::StagedFolder staged(settings.out);

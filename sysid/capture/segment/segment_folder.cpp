@@ -277,6 +277,22 @@ std::string tilt_warning(const FoundTable& table) {
   return text;
 }
 
+// A tool grasps cloth that lies, and its flange is some way above it; may be empty.
+std::string flange_warning(const TablePlane& table, const std::vector<double>& times,
+                           const SegmentFolderSettings& settings) {
+  constexpr double kLowest = 0.06, kHighest = 0.4;  // of a flange over the table [m]
+  if (!settings.gripper || times.empty()) return "";
+  double lowest = INFINITY;
+  for (const double time : times) {
+    const Eigen::Vector3d tool = data::pose_at(*settings.gripper, time).translation();
+    lowest = std::min(lowest, (tool - table.point).dot(table.normal));
+  }
+  if (lowest < kLowest || lowest > kHighest) return "";
+  return settings.gripper_path + ": the gripper is never nearer to the table than " +
+         data::format_short(std::round(1000 * lowest) / 1000) +
+         " m: is it the flange, in place of the tool centre point? (or does the cloth hang from the start?)";
+}
+
 // Where all the points went instead.
 std::string no_cloth(const std::vector<Segmentation>& frames, const SegmentFolderSettings& settings) {
   std::array<std::size_t, point_label_count> counts{};
@@ -405,6 +421,8 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
   const std::set<StillCell> still = still_cells(sample, plane, settings.segment);
   constexpr double doubtful = 2 * M_PI / 180;
   if (result.table && result.table->tilt > doubtful) result.warnings.push_back(tilt_warning(*result.table));
+  if (const std::string flange = plane ? flange_warning(*plane, times, settings) : ""; !flange.empty())
+    result.warnings.push_back(flange);
 
   std::vector<LabelledFrame> shown;
   std::size_t with_cloth = 0, not_finite = 0;

@@ -259,6 +259,18 @@ TEST_F(ImportFiles, ATableAboveTheGripperIsDoubted) {
   EXPECT_EQ(doubts(0.06), 1);
 }
 
+TEST_F(ImportFiles, AFlangeForTheToolIsAskedFor) {
+  const auto said = [&] { return data::input_error_of([&] { import_recording(settings_); }); };
+  for (Eigen::Isometry3d& pose : settings_.trajectory.poses) pose.translation().z() += 0.15;
+  EXPECT_NE(
+      said().find("; it starts 0.152 m above the table: is the trajectory that of the flange, in place of "
+                  "the tool centre point?"),
+      std::string::npos)
+      << said();
+  for (Eigen::Isometry3d& pose : settings_.trajectory.poses) pose.translation().z() += 0.5;
+  EXPECT_EQ(said().find("flange"), std::string::npos) << said();  // no tool is so long
+}
+
 TEST_F(ImportFiles, SenselessSettingsAreRefusedByTheirNames) {
   const auto message = [&](auto change) {
     ImportSettings settings = settings_;

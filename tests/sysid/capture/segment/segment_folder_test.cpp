@@ -342,6 +342,23 @@ TEST_F(SegmentFolder, AnotherDepthScaleIsNamedWhereItMakesACell) {
     }
 }
 
+TEST_F(SegmentFolder, AFlangeForTheToolIsWarnedOf) {
+  const std::vector<double> heights = {0.02, 0.06, 0.1};
+  write_depth_view(folder("raw"), heights);
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches(heights);
+  const auto warnings = [&](const char* out) {
+    return segment_folder({open_raw_view(folder("raw"))}, {0, 0.1, 0.2}, settings, folder(out)).warnings;
+  };
+  EXPECT_TRUE(warnings("tool").empty());
+  for (Eigen::Isometry3d& pose : settings.gripper->poses) pose.translation().z() += 0.12;
+  EXPECT_EQ(
+      warnings("flange"),
+      std::vector<std::string>{
+          "trajectory: the gripper is never nearer to the table than 0.15 m: is it the flange, in place of "
+          "the tool centre point? (or does the cloth hang from the start?)"});
+}
+
 TEST_F(SegmentFolder, AWallThatIsLargerThanTheClothIsNotTheCloth) {
   const std::vector<double> heights = {0.1, 0.15, 0.2, 0.25, 0.3};
   write_depth_view(folder("raw"), heights);
