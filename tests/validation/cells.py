@@ -181,7 +181,7 @@ RIGHT = {
     "registered to 3 cm": lambda cell, lens, draw, folder: registered(cell, draw),
     "an oblong sheet": lambda cell, lens, draw, folder: None,
     "an oblong sheet, 5 deg off": lambda cell, lens, draw, folder: turned_heading(cell, draw.choice((-5, 5))),
-    "an oblong sheet, 12 % larger": lambda cell, lens, draw, folder: stated_size(cell, draw.choice((0.88, 1.12))),
+    "an oblong sheet, 12 % off": lambda cell, lens, draw, folder: stated_size(cell, draw.choice((0.88, 1.12))),
     "wall, arm and another base": lambda cell, lens, draw, folder: (with_wall(cell, lens, draw), with_arm(cell, lens, draw),
                                                                     moved(cell, *anywhere(draw))),
 }
