@@ -1,6 +1,9 @@
 #include "data/camera/extrinsics.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <initializer_list>
 
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
@@ -64,6 +67,29 @@ CameraIntrinsics read_lens(const JsonObject& object, const Eigen::Vector2d& size
   return lens;
 }
 
+bool has_word(std::string name, std::initializer_list<const char*> words) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return std::any_of(words.begin(), words.end(),
+                     [&](const char* word) { return name.find(word) != std::string::npos; });
+}
+
+/// Throws InputError where the names of the frames say that this is the pose of the base in the camera.
+void expect_camera_in_parent(const JsonObject& object, const NamedTransform& transform) {
+  const auto is_camera = [](const std::string& name) {
+    return has_word(name, {"cam", "optical", "lens", "depth", "rgb", "color", "sensor", "kinect"});
+  };
+  const auto is_robot = [](const std::string& name) {
+    return has_word(name, {"base", "world", "robot", "gripper", "flange", "tool", "tcp", "hand"});
+  };
+  if (is_camera(transform.child)) return;
+  if (is_robot(transform.child))
+    throw object.error("child", "the camera: the transform is that of the camera in " + transform.child +
+                                    ", not its inverse (parent base or gripper, child camera)");
+  if (is_camera(transform.parent) && !is_robot(transform.parent))
+    throw object.error("parent",
+                       "base or gripper: the transform is that of the camera in it, not its inverse");
+}
+
 /// Files of pairs of poses have none.
 void read_lenses(const JsonObject& file, CameraPose& pose) {
   if (!file.has("lens")) return;
@@ -124,6 +150,7 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
     throw file.error("schema", "\"flash-extrinsics/2\" or \"flash-extrinsics/1\"");
   CameraPose pose;
   pose.transform = read_transform(file.object("transform"));
+  expect_camera_in_parent(file.object("transform"), pose.transform);
   read_lenses(file, pose);
   pose.warnings = read_warnings(file);
   pose.usable = file.integer("exit_code", 0) == 0;

@@ -245,8 +245,7 @@ data::Recording import_recording(const ImportSettings& settings) {
     const double heading = settings.heading.value_or(heading_of_clouds(keyframes, gripper));
     recording.base_from_object = start_pose(rest, *corner, held, gripper, table_height, heading);
     sheet = stated_sheet(recording, heading);
-    if (sheet)
-      for (const std::string& line : compare_sides(recording, keyframes, *sheet)) notices.push_back(line);
+    if (sheet && sheet->right != sheet->left) notices.push_back(sides_taken(*sheet));
     if (!settings.heading)
       guesses.push_back("the sheet's diagonal points to " +
                         data::format_short(heading * 180 / std::numbers::pi) +
@@ -261,14 +260,23 @@ data::Recording import_recording(const ImportSettings& settings) {
                           ? "; or the table's height, guessed as " + data::format_short(table_height) +
                                 " m from the gripper's start and the crop, is wrong: give it as --table-z"
                           : "";
+  if (const std::string flange = flange_doubt(recording); corner && !flange.empty()) doubt += "; " + flange;
   if (const std::string approach = approach_of(trajectory); corner && !approach.empty())
     doubt += "; " + approach;
   data::StagedFolder staged(settings.out);
   copy_files(staged.path(), settings.stop, recording);
   check_as_file(recording, (fs::path(staged.path()) / "recording.json").string(), doubt);
   std::vector<std::string> found = contradictions(recording, keyframes);
-  if (const std::string beside = sheet ? beside_the_sheet(recording, keyframes, *sheet) : ""; !beside.empty())
-    settings.heading ? found.push_back(beside) : notices.push_back("import: warning: " + beside);
+  if (sheet) {
+    constexpr double kByEye = 0.1, kGuessed = 0.35;  // what a heading is known to [rad]
+    const std::string swapped =
+        swapped_sides(recording, keyframes, *sheet, settings.heading ? kByEye : kGuessed);
+    for (const std::string& text : {swapped, beside_the_sheet(recording, keyframes, *sheet)})
+      if (!text.empty())
+        settings.heading ? found.push_back(text) : notices.push_back("import: warning: " + text);
+    if (swapped.empty())
+      for (const std::string& line : compare_sides(recording, keyframes, *sheet)) notices.push_back(line);
+  }
   for (const std::string& text : found) {
     if (!settings.accept_unusable)
       throw data::InputError("import: " + text + " --despite-doubts takes it as it is");

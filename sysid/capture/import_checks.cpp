@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kRegistration = 0.15;  // from a gripper to the nearest point that is seen, at most [m]
 constexpr double kFarthest = 20;        // beyond it, millimetres were given for metres [m]
+constexpr double kHighest = 0.06;       // of a tool that holds a lying sheet, over the table [m]
 constexpr double kStretch = 0.05;       // by which calibrated cameras and robots are off at most [m]
 
 std::string metres(double length) { return data::format_short(std::round(1000 * length) / 1000) + " m"; }
@@ -80,7 +81,6 @@ std::vector<std::string> contradictions(const data::Recording& recording,
   constexpr std::size_t kFewest = 3;  // frames
   constexpr double kOffTable = 0.05;  // [m]
   constexpr double kShare = 0.6;      // of its diagonal that hanging cloth reaches, folds and all
-  constexpr double kHighest = 0.06;   // of a tool that holds a lying sheet, over the table [m]
   const std::vector<HeldCloud> held = held_clouds(recording, keyframes);
   if (held.size() < kFewest) return {};
   const Eigen::RowVector3d size =
@@ -143,6 +143,15 @@ std::vector<std::string> contradictions(const data::Recording& recording,
                                                     std::numbers::pi)) +
                       " has it: is it turned by half a turn?");
   return found;
+}
+
+std::string flange_doubt(const data::Recording& recording) {
+  constexpr double kFarthest = 0.4;  // of a flange from its tool [m]
+  const data::Trajectory& trajectory = recording.trajectories.at(recording.grasps.front().gripper);
+  const double height = trajectory.poses.front().translation().z() - recording.table_point.z();
+  if (height <= kHighest + recording.nuisance.offset.z() || height > kFarthest) return "";
+  return "it starts " + metres(height) +
+         " above the table: is the trajectory that of the flange, in place of the tool centre point?";
 }
 
 std::string approach_of(const data::Trajectory& trajectory) {

@@ -19,6 +19,11 @@ namespace flash::sysid {
 std::vector<std::string> contradictions(const data::Recording& recording,
                                         const std::vector<data::Keyframe>& keyframes);
 
+/// Asks whether the trajectory is that of the flange, where it starts as high above the table as a flange is
+/// above the cloth that its tool holds, 6 to 40 cm; else empty. The bound on the camera's height is allowed
+/// for.
+std::string flange_doubt(const data::Recording& recording);
+
 /// Where the tool comes down before it lifts, as of a recording that begins with the approach: when it is
 /// down, and the option that cuts there. Down is where it is within 1 mm of its lowest place before it
 /// rises by 20 mm. Empty where it begins there.

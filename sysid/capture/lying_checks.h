@@ -12,8 +12,19 @@ namespace flash::sysid {
 /// of its diagonal [rad]. Empty where no corner of a sheet that is made on the spot is grasped.
 std::optional<LyingSheet> stated_sheet(const data::Recording& recording, double heading);
 
-/// Whether the first clouds, of a sheet that still lies, fit it better with its sides changed over or turned.
-/// Where none shows it lying, as segment cuts it away with the table, those of the lift tell.
+/// Which side is taken to be which, for people to read.
+std::string sides_taken(const LyingSheet& stated);
+
+/// Why the sides of the sheet are changed over, for people to read; empty where they need not be. The first
+/// clouds tell, of a sheet that still lies. Where none shows it, as segment cuts it away with the table,
+/// raised cloth tells that reaches down to the table, unrolled (unrolled_cloth.h): it ends at its edges. It
+/// tells sides of which one is at most 0.8 of the other. The heading may be off by `slack` [rad] and the
+/// bounds on yaws, the camera by those on its offset.
+std::string swapped_sides(const data::Recording& recording, const std::vector<data::Keyframe>& keyframes,
+                          const LyingSheet& stated, double slack);
+
+/// Whether the first clouds, of a sheet that still lies, fit it better when it is turned. Where none shows it
+/// lying, whether those of the lift fit it better with its sides changed over.
 std::vector<std::string> compare_sides(const data::Recording& recording,
                                        const std::vector<data::Keyframe>& keyframes,
                                        const LyingSheet& stated);

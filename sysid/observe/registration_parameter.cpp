@@ -16,7 +16,8 @@ std::string at_bound_text(const RegistrationParameter& parameter, const data::Nu
                             : name == "time" ? data::format_short(bounds.time) + " s"
                                              : data::format_short(bounds.offset[name.back() - 'x']) + " m";
   return std::string(parameter.label) + " is at its bound of " + bound + "; widen nuisance." +
-         parameter.field + " in recording.json";
+         parameter.field + " in recording.json" +
+         (name == "yaw" ? ", or mend the heading with which the sheet starts (--heading of import)" : "");
 }
 
 }  // namespace flash::sysid

@@ -35,6 +35,8 @@ class Cell:
     table: float = 0.0
     heading: float | None = None  # [deg]
     stated: float = 1.0  # size over the true one
+    height: float = 1.0  # of the sheet over its width, which is `side`
+    swapped: bool = False  # width and height, as stated
     segment: tuple = ()
     imported: tuple = ()
 
@@ -65,25 +67,29 @@ def quaternion_of(R):
     return v[:, w.argmax()]
 
 
-def rendered(runs, seed, high=False):
-    """A lift by a corner, as a camera at its side or above it sees it, of a towel of 0.2 to 1.2 m; `high`: off the table."""
+def rendered(runs, seed, high=False, oblong=False):
+    """A lift by a corner, as a camera at its side or above it sees it, of a towel of 0.2 to 1.2 m; `high`: off the table; `oblong`: one
+    side is 0.5 to 0.7 of the other."""
     draw = random.Random(seed)
     side = round(0.2 * 6 ** draw.random(), 2)
+    ratio = random.Random(f"{seed} oblong").uniform(0.5, 0.7)
+    height = (ratio if seed % 2 else 1 / ratio) if oblong else 1.0
     asset = synthetic.write_asset(runs.out, young=100.0)
-    around, height = draw.uniform(-0.8, 0.8) - math.pi / 2, draw.uniform(0.9, 2.0)
-    camera = (side * (0.5 + 2.2 * math.cos(around)), side * (0.5 + 2.2 * math.sin(around)), 0.1 + side * height)
+    around, above = draw.uniform(-0.8, 0.8) - math.pi / 2, draw.uniform(0.9, 2.0)
+    longer = side * max(1.0, height)
+    camera = (longer * (0.5 + 2.2 * math.cos(around)), longer * (0.5 + 2.2 * math.sin(around)), 0.1 + longer * above)
     fov = draw.uniform(50, 75)
-    name = f"cell_{seed}" + ("_high" if high else "")
-    folder = runs.synth(name, asset, "--mesh", f"sheet:{side}x{side}:{side / 12:.4f}", "--rate", "10", "--raw", "--resolution", "160x120",
+    name = f"cell_{seed}" + ("_high" if high else "") + ("_oblong" if oblong else "")
+    folder = runs.synth(name, asset, "--mesh", f"sheet:{side}x{round(side * height, 4)}:{side / 12:.4f}", "--rate", "10", "--raw", "--resolution", "160x120",
                         "--fov", f"{fov:.1f}", f"--camera={camera[0]:.4f},{camera[1]:.4f},{camera[2]:.4f}", "--seed", str(seed),
                         *((f"--displacement={-0.25 * side:.4f},0,{1.5 * side:.4f}",) if high else ()),
                         *synthetic.settings({"bending": 5e-5 * 20 ** draw.random(), "friction": draw.uniform(0.2, 0.5)}))
     view = folder / "camera1"
     transform = json.loads((view / "extrinsics.json").read_text())["transform"]
     images = sorted((view / "depth").glob("*.png"))
-    heading = -135.0  # of the corner 1,1, which the robot's kind holds
+    heading = math.degrees(math.atan2(-height, -1))  # of the corner 1,1, which the robot's kind holds
     return Cell(side, pose(rotation_of(*transform["rotation_xyzw"]), transform["translation"]), numpy.loadtxt(folder / "gripper.tum")[:, :4],
-                [depth_png.read(image) for image in images], [image.name for image in images], heading=heading), view / "camera_info.yaml"
+                [depth_png.read(image) for image in images], [image.name for image in images], heading=heading, height=height), view / "camera_info.yaml"
 
 
 def rays(lens, shape):
@@ -173,6 +179,9 @@ RIGHT = {
     "an arm in view": lambda cell, lens, draw, folder: with_arm(cell, lens, draw),
     "gaps that are declared": lambda cell, lens, draw, folder: kept_frames(cell, draw, folder, True),
     "registered to 3 cm": lambda cell, lens, draw, folder: registered(cell, draw),
+    "an oblong sheet": lambda cell, lens, draw, folder: None,
+    "an oblong sheet, 5 deg off": lambda cell, lens, draw, folder: turned_heading(cell, draw.choice((-5, 5))),
+    "an oblong sheet, 12 % off": lambda cell, lens, draw, folder: stated_size(cell, draw.choice((0.88, 1.12))),
     "wall, arm and another base": lambda cell, lens, draw, folder: (with_wall(cell, lens, draw), with_arm(cell, lens, draw),
                                                                     moved(cell, *anywhere(draw))),
 }
@@ -197,12 +206,16 @@ def flange(cell, draw):
     cell.path = cell.path + numpy.array([0, 0, 0, draw.uniform(0.1, 0.16)])
 
 
-def turned_heading(cell):
-    cell.heading += 180
+def turned_heading(cell, angle):
+    cell.heading += angle
 
 
 def stated_size(cell, factor):
     cell.stated = factor
+
+
+def swapped_sides(cell):
+    cell.swapped = True
 
 
 def other_table(cell, draw):
@@ -220,9 +233,10 @@ WRONG = {
     "a gripper in another frame": lambda cell, lens, draw, folder: world_gripper(cell, draw),
     "the flange for the tool": lambda cell, lens, draw, folder: flange(cell, draw),
     "lost frames and a rate": lambda cell, lens, draw, folder: kept_frames(cell, draw, folder, False),
-    "half a turn of the heading": lambda cell, lens, draw, folder: turned_heading(cell),
+    "half a turn of the heading": lambda cell, lens, draw, folder: turned_heading(cell, 180),
     "twice the cloth, off the table": lambda cell, lens, draw, folder: stated_size(cell, 2.0),
     "half the cloth, off the table": lambda cell, lens, draw, folder: stated_size(cell, 0.5),
+    "an oblong sheet, sides swapped": lambda cell, lens, draw, folder: swapped_sides(cell),
     "another table": lambda cell, lens, draw, folder: other_table(cell, draw),
     "other times": lambda cell, lens, draw, folder: other_times(cell),
 }
@@ -244,9 +258,9 @@ def written(cell, lens, folder):
 def said_of(sysid, cell, lens, folder):
     """The error of the first program that refuses, or nothing."""
     view = written(cell, lens, folder)
-    size = cell.side * cell.stated
+    size = [cell.side * cell.stated, cell.side * cell.stated * cell.height][::-1 if cell.swapped else 1]
     for verb in (["segment", view, "--trajectory", folder / "tool.tum", "--times", cell.times, *cell.segment, "-o", folder / "segmented"],
-                 ["import", folder / "segmented" / "frames", "--mesh", f"sheet:{size}x{size}:{size / 12:.4f}", "--grasp", "corner:1,1",
+                 ["import", folder / "segmented" / "frames", "--mesh", f"sheet:{size[0]:.4f}x{size[1]:.4f}:{min(size) / 12:.4f}", "--grasp", "corner:1,1",
                   "--tool-at", "patch", f"--heading={cell.heading:.3f}", *cell.imported, "-o", folder / "lift"]):
         done = subprocess.run([sysid, *map(str, verb), "--quiet"], capture_output=True, text=True)
         if done.returncode == 2:
@@ -271,7 +285,7 @@ def main():
 
     def done(job):
         seed, right, name = job
-        cell, lens = rendered(runs, seed, name in HIGH)
+        cell, lens = rendered(runs, seed, name in HIGH, "oblong" in name)
         draw = random.Random(f"{seed} {name}")
         folder = options.out / f"{seed}_{'right' if right else 'wrong'}_{name.replace(' ', '_')}"
         shutil.rmtree(folder, ignore_errors=True)
@@ -283,8 +297,8 @@ def main():
         return job, said
 
     for seed in range(options.seed, options.seed + options.cells):
-        for high in (False, True):
-            rendered(runs, seed, high)
+        for high, oblong in ((False, False), (True, False), (False, True)):
+            rendered(runs, seed, high, oblong)
     counts = collections.defaultdict(lambda: [0, 0, ""])
     failed = 0
     with concurrent.futures.ThreadPoolExecutor(2) as pool:

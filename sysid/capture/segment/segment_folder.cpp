@@ -117,7 +117,7 @@ struct PoseMistake {
   std::function<void(CellPoses&)> mend;
 };
 
-std::vector<PoseMistake> usual_mistakes() {
+std::vector<PoseMistake> usual_poses() {
   using Pose = Eigen::Isometry3d;
   const Pose opengl(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()));
   return {{"the camera's axes are those of OpenGL (y up, z backwards), where x right, y down, z forwards is "
@@ -130,6 +130,14 @@ std::vector<PoseMistake> usual_mistakes() {
           {"the pose is that of the base in a camera with axes of OpenGL",
            [opengl](CellPoses& poses) {
              change_cameras(poses, [&](const Pose& pose) { return (opengl * pose).inverse(); });
+           }},
+          {"the quaternion of the camera is w x y z, where x y z w is expected",
+           [](CellPoses& poses) {
+             change_cameras(poses, [](Pose pose) {
+               const Eigen::Quaterniond read(pose.linear());
+               pose.linear() = Eigen::Quaterniond(read.x(), read.y(), read.z(), read.w()).toRotationMatrix();
+               return pose;
+             });
            }},
           {"the camera's position is in millimetres, where metres are expected",
            [](CellPoses& poses) {
@@ -144,30 +152,95 @@ std::vector<PoseMistake> usual_mistakes() {
            }}};
 }
 
-// Which usual mistake about the poses would make a cell of it, for people to read; may be empty.
-std::string suspected_pose(const std::vector<RawView>& views, const std::vector<double>& times,
-                           const SegmentFolderSettings& settings) {
-  for (const PoseMistake& mistake : usual_mistakes()) {
+// Of depth images whose counts are no metres by themselves.
+std::vector<PoseMistake> usual_scales(const std::vector<RawView>& views) {
+  std::vector<PoseMistake> mistakes;
+  for (const double scale : {1e-3, 1e-4, 2.5e-4, 2e-4, 1e-2, 1.0}) {
+    const auto is_other = [scale](const RawView& view) {
+      return view.camera && data::lower_extension(view.files.front()) == ".png" &&
+             std::abs(view.depth_scale - scale) > 1e-6 * scale;
+    };
+    if (std::any_of(views.begin(), views.end(), is_other))
+      mistakes.push_back(
+          {"a count of the depth images is " + data::format_short(scale) + " m (--depth-scale " +
+               data::format_short(scale) + "), where " +
+               data::format_short(std::find_if(views.begin(), views.end(), is_other)->depth_scale) +
+               " m is taken",
+           [is_other, scale](CellPoses& poses) {
+             for (RawView& view : poses.views)
+               if (is_other(view)) view.depth_scale = scale;
+           }});
+  }
+  return mistakes;
+}
+
+double lowest_over(const TablePlane& table, const std::vector<CellFrame>& frames) {
+  double lowest = INFINITY;
+  for (const CellFrame& frame : frames)
+    if (frame.tool) lowest = std::min(lowest, (*frame.tool - table.point).dot(table.normal));
+  return lowest;
+}
+
+constexpr double known_height = 0.03;  // of a table that is stated and one that is seen [m]
+constexpr double level = 0.1;          // tables are, as a camera sees them [rad]
+
+// The table that is seen, if it is level, and where it is stated at that height.
+std::optional<FoundTable> seen_table(const std::vector<CellFrame>& frames,
+                                     const SegmentFolderSettings& settings) {
+  try {
+    FoundTable table = table_of(frames, settings.segment);
+    const Eigen::Vector3d stated(0, 0, settings.table_height.value_or(0));
+    const double off = settings.table_height ? (stated - table.plane.point).dot(settings.segment.up) : 0;
+    if (table.tilt < level && std::abs(off) < known_height) return table;
+  } catch (const data::InputError&) {  // no table there
+  }
+  return std::nullopt;
+}
+
+// Which usual mistake would make a cell of what is given, for people to read; may be empty. One with which a
+// level table is seen counts first, and there the one whose gripper comes closest to it, as it lifts from it.
+// `seen`: only such ones count.
+std::string suspected_mistake(const std::vector<RawView>& views, const std::vector<double>& times,
+                              const SegmentFolderSettings& settings, bool seen) {
+  std::vector<PoseMistake> mistakes = usual_poses();
+  for (PoseMistake& mistake : usual_scales(views)) mistakes.push_back(std::move(mistake));
+  std::string with_table, without_table;
+  double least = INFINITY;
+  for (const PoseMistake& mistake : mistakes) {
     CellPoses other{views, settings.gripper};
     mistake.mend(other);
     try {
       const std::vector<CellFrame> frames = sampled_frames(other.views, times, other.gripper);
-      if (fault_of(other.views, frames, table_as_asked(frames, settings), settings.segment).empty())
-        return ". It would be one if " + mistake.said;
-    } catch (const data::InputError&) {  // no table there
+      if (const std::optional<FoundTable> table = seen_table(frames, settings)) {
+        if (!fault_of(other.views, frames, table, settings.segment).empty()) continue;
+        const double height = settings.gripper ? std::abs(lowest_over(table->plane, frames)) : table->tilt;
+        if (height < least) least = height, with_table = mistake.said;
+      } else if (!seen && without_table.empty()) {
+        if (fault_of(other.views, frames, table_as_asked(frames, settings), settings.segment).empty())
+          without_table = mistake.said;
+      }
+    } catch (const data::InputError&) {  // no table there, or points that are nowhere
     }
   }
-  return "";
+  const std::string& said = with_table.empty() ? without_table : with_table;
+  return said.empty() ? "" : ". It would be one if " + said;
 }
 
 void check_cell(const std::vector<RawView>& views, const std::vector<double>& times,
                 const std::vector<CellFrame>& frames, const SegmentFolderSettings& settings,
                 SegmentedFolder& result) {
-  const std::string fault = fault_of(views, frames, result.table, settings.segment);
+  std::string fault = fault_of(views, frames, result.table, settings.segment), mistake;
+  if (!fault.empty()) {
+    mistake = suspected_mistake(views, times, settings, false);
+  } else if (settings.table_height && !seen_table(frames, settings)) {
+    // A stated table hides that none is seen there; it may be out of view.
+    mistake = suspected_mistake(views, times, settings, true);
+    if (!mistake.empty())
+      fault = "no plane is seen at --table-z " + data::format_short(*settings.table_height);
+  }
   if (fault.empty()) return;
-  const std::string text = views.front().folder +
-                           ": cameras, table and gripper are not of one cell: " + fault +
-                           suspected_pose(views, times, settings);
+  const std::string text =
+      views.front().folder + ": cameras, table and gripper are not of one cell: " + fault + mistake;
   if (!settings.accept_fault)
     throw data::InputError(text + ". Look at the camera's pose and at the frame and the tool of " +
                            (settings.gripper ? settings.gripper_path : "the trajectory") +
@@ -202,6 +275,22 @@ std::string tilt_warning(const FoundTable& table) {
       "--table-z gives one that is level",
       table.tilt * 180 / M_PI, n.x(), n.y(), n.z(), table.agreeing, table.frames);
   return text;
+}
+
+// A tool grasps cloth that lies, and its flange is some way above it; may be empty.
+std::string flange_warning(const TablePlane& table, const std::vector<double>& times,
+                           const SegmentFolderSettings& settings) {
+  constexpr double kLowest = 0.06, kHighest = 0.4;  // of a flange over the table [m]
+  if (!settings.gripper || times.empty()) return "";
+  double lowest = INFINITY;
+  for (const double time : times) {
+    const Eigen::Vector3d tool = data::pose_at(*settings.gripper, time).translation();
+    lowest = std::min(lowest, (tool - table.point).dot(table.normal));
+  }
+  if (lowest < kLowest || lowest > kHighest) return "";
+  return settings.gripper_path + ": the gripper is never nearer to the table than " +
+         data::format_short(std::round(1000 * lowest) / 1000) +
+         " m: is it the flange, in place of the tool centre point? (or does the cloth hang from the start?)";
 }
 
 // Where all the points went instead.
@@ -316,13 +405,24 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
   for (const RawView& view : views)
     result.warnings.insert(result.warnings.end(), view.warnings.begin(), view.warnings.end());
   const std::vector<CellFrame> sample = sampled_frames(views, times, settings.gripper);
-  result.table = table_as_asked(sample, settings);
+  try {
+    result.table = table_as_asked(sample, settings);
+  } catch (const data::InputError&) {
+    const std::string mistake = suspected_mistake(views, times, settings, true);
+    if (mistake.empty()) throw;
+    throw data::InputError(views.front().folder +
+                           ": cameras, table and gripper are not of one cell: no table that stands still is "
+                           "seen across the vertical" +
+                           mistake);
+  }
   expect_moving(views.front().folder, sample, settings);
   check_cell(views, times, sample, settings, result);
   const auto plane = result.table ? std::optional(result.table->plane) : std::nullopt;
   const std::set<StillCell> still = still_cells(sample, plane, settings.segment);
   constexpr double doubtful = 2 * M_PI / 180;
   if (result.table && result.table->tilt > doubtful) result.warnings.push_back(tilt_warning(*result.table));
+  if (const std::string flange = plane ? flange_warning(*plane, times, settings) : ""; !flange.empty())
+    result.warnings.push_back(flange);
 
   std::vector<LabelledFrame> shown;
   std::size_t with_cloth = 0, not_finite = 0;

@@ -71,6 +71,29 @@ TEST_F(ExtrinsicsFile, WarningsOfAUsableAnswerAreCarried) {
   EXPECT_EQ(pose.warnings, std::vector<std::string>{"two views left out"});
 }
 
+TEST_F(ExtrinsicsFile, TheBaseInTheCameraIsRefusedByItsNames) {
+  const auto said = [&](const std::string& parent, const std::string& child) {
+    const std::string path = folder_.write(
+        "camera.json", R"({"schema": "flash-extrinsics/2", "transform": {"parent": ")" + parent +
+                           R"(", "child": ")" + child +
+                           R"(", "translation": [0.5, 0.1, 1], "rotation_xyzw": [1, 0, 0, 0]}})");
+    return input_error_of([&] { load_camera_pose(path, true); });
+  };
+  EXPECT_EQ(
+      said("camera", "base"),
+      (folder_ / "camera.json") +
+          ": transform.child: found \"base\", expected the camera: the transform is that of the camera in "
+          "base, not its inverse (parent base or gripper, child camera)");
+  EXPECT_NE(said("camera_color_optical_frame", "base_link"), "");
+  EXPECT_NE(said("CAM1", "panda_link0").find("transform.parent: found \"CAM1\", expected base or gripper"),
+            std::string::npos);
+  for (const char* parent : {"base", "base_link", "world", "gripper", "tool0", "camera_mount", ""})
+    for (const char* child : {"camera", "camera_color_optical_frame", "Cam0", "hand_camera", "tool_rgb"})
+      EXPECT_EQ(said(parent, child), "") << parent << ' ' << child;
+  EXPECT_EQ(said("", ""), "");
+  EXPECT_EQ(said("base", "realsense"), "");
+}
+
 TEST_F(ExtrinsicsFile, MistakesAreNamed) {
   EXPECT_NE(refusal(R"(, "exit_cod": 3)").find("exit_cod: unknown field (did you mean \"exit_code\"?)"),
             std::string::npos);

@@ -214,15 +214,26 @@ TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
     set_sheet("sheet:" + sheet + ":0.02", settings_);
     settings_.grasp.corner = corner;
     for (const std::string& notice : import_recording(settings_).notices)
-      if (notice.find("--mesh") != std::string::npos) return notice;
+      if (notice.find("--mesh says") != std::string::npos) return notice;
     return std::string();
   };
   EXPECT_EQ(told("0.2x0.3", {0, 0}), "");
   EXPECT_EQ(told("0.2x0.3", {1, 1}), "");
   EXPECT_EQ(told("0.3x0.2", {1, 0}), "");
-  EXPECT_NE(told("0.3x0.2", {0, 0}).find("--mesh: with the sides changed over, 0.2x0.3, the sheet is"),
+  EXPECT_NE(told("0.3x0.2", {0, 0}).find("swap the sides, --mesh sheet:0.2x0.3:0.02, or name"),
             std::string::npos);
   EXPECT_NE(told("0.2x0.3", {0, 1}), "");
+  // Where the heading is known, they are refused, and accepted with a warning.
+  settings_.heading = std::atan2(0.2, -0.3);
+  EXPECT_EQ(told("0.2x0.3", {0, 0}), "");
+  EXPECT_TRUE(
+      data::input_error_of([&] {
+        told("0.3x0.2", {0, 0});
+      })
+          .starts_with("import: the cloth lies with 200 mm on the right hand of its diagonal and 300 mm "
+                       "on the left, and --mesh says 300 mm and 200 mm"));
+  settings_.accept_unusable = true;
+  EXPECT_NE(told("0.3x0.2", {0, 0}), "");
 }
 
 TEST_F(ImportFiles, TheMiddleOfThePatchCanBeAtTheTool) {
@@ -246,6 +257,18 @@ TEST_F(ImportFiles, ATableAboveTheGripperIsDoubted) {
   };
   EXPECT_EQ(doubts(0.05), 0);
   EXPECT_EQ(doubts(0.06), 1);
+}
+
+TEST_F(ImportFiles, AFlangeForTheToolIsAskedFor) {
+  const auto said = [&] { return data::input_error_of([&] { import_recording(settings_); }); };
+  for (Eigen::Isometry3d& pose : settings_.trajectory.poses) pose.translation().z() += 0.15;
+  EXPECT_NE(
+      said().find("; it starts 0.152 m above the table: is the trajectory that of the flange, in place of "
+                  "the tool centre point?"),
+      std::string::npos)
+      << said();
+  for (Eigen::Isometry3d& pose : settings_.trajectory.poses) pose.translation().z() += 0.5;
+  EXPECT_EQ(said().find("flange"), std::string::npos) << said();  // no tool is so long
 }
 
 TEST_F(ImportFiles, SenselessSettingsAreRefusedByTheirNames) {

@@ -299,6 +299,66 @@ TEST_F(SegmentFolder, CamerasAndGrippersOfOtherCellsAreRefusedAndTheMistakeIsNam
             std::string::npos);
 }
 
+TEST_F(SegmentFolder, AMistakeThatHidesTheTableIsNamedWhetherOneIsSoughtOrStated) {
+  write_depth_view(folder("raw"), {0.1, 0.2, 0.3});
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches({0.1, 0.2, 0.3});
+  const RawView view = open_raw_view(folder("raw"));
+  const auto message_with = [&](const RawView& other) {
+    return message_of([&] { segment_folder({other}, {0, 0.1, 0.2}, settings, folder("out")); });
+  };
+  // Half a turn about x + y looks down too; its quaternion as w x y z makes the camera look along y.
+  RawView other = view;
+  other.base_from_camera.linear() =
+      Eigen::Quaterniond(0, 0, std::sqrt(0.5), std::sqrt(0.5)).toRotationMatrix();
+  const std::string quaternion = ". It would be one if the quaternion of the camera is w x y z";
+  EXPECT_NE(message_with(other).find("no table that stands still is seen across the vertical" + quaternion),
+            std::string::npos)
+      << message_with(other);
+  settings.table_height = 0.07;
+  EXPECT_EQ(message_with(view), "no error");
+  settings.gripper.reset();  // which would be far from what is seen
+  EXPECT_NE(message_with(other).find("no plane is seen at --table-z 0.07" + quaternion), std::string::npos)
+      << message_with(other);
+  settings.table_height = -0.3;  // of a table that is not in view
+  EXPECT_EQ(message_with(view), "no error");
+}
+
+TEST_F(SegmentFolder, AnotherDepthScaleIsNamedWhereItMakesACell) {
+  write_depth_view(folder("raw"), {0.1, 0.2, 0.3});
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches({0.1, 0.2, 0.3});
+  for (const bool table : {true, false})
+    for (const double scale : {1e-4, 2e-4, 2.5e-4, 1e-2}) {
+      RawView view = open_raw_view(folder("raw"));
+      view.depth_scale = scale;
+      settings.table_height = table ? std::nullopt : std::optional(0.07);
+      const std::string said = message_of([&] {
+        segment_folder({view}, {0, 0.1, 0.2}, settings, folder("out"));
+      });
+      EXPECT_NE(said.find("It would be one if a count of the depth images is 0.001 m (--depth-scale 0.001)"),
+                std::string::npos)
+          << scale << ' ' << said;
+    }
+}
+
+TEST_F(SegmentFolder, AFlangeForTheToolIsWarnedOf) {
+  const std::vector<double> heights = {0.02, 0.06, 0.1};
+  write_depth_view(folder("raw"), heights);
+  SegmentFolderSettings settings;
+  settings.gripper = above_patches(heights);
+  const auto warnings = [&](const char* out) {
+    return segment_folder({open_raw_view(folder("raw"))}, {0, 0.1, 0.2}, settings, folder(out)).warnings;
+  };
+  EXPECT_TRUE(warnings("tool").empty());
+  for (Eigen::Isometry3d& pose : settings.gripper->poses) pose.translation().z() += 0.12;
+  EXPECT_EQ(
+      warnings("flange"),
+      std::vector<std::string>{
+          "trajectory: the gripper is never nearer to the table than 0.15 m: is it the flange, in place of "
+          "the tool centre point? (or does the cloth hang from the start?)"});
+}
+
 TEST_F(SegmentFolder, AWallThatIsLargerThanTheClothIsNotTheCloth) {
   const std::vector<double> heights = {0.1, 0.15, 0.2, 0.25, 0.3};
   write_depth_view(folder("raw"), heights);
