@@ -59,8 +59,8 @@ std::string edge_of(const sysid::ParameterFinding& finding) {
   return edge.empty() ? "" : "; " + edge;
 }
 
-// "1.59 mm from the observed points, on cells of no size (extrapolated), 1.64 mm on the mesh searched". Of
-// markers alone it is their own distance, not what noise stated for them makes of it beside other terms.
+// "1.59 mm from the observed points, on cells of no size (extrapolated), 1.64 mm on the mesh of the answer".
+// Of markers alone it is their own distance, not what noise stated for them makes of it beside other terms.
 std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecording& recording) {
   const auto setting = [&](const char* name) {
     const auto found = summary.settings.find(name);
@@ -71,7 +71,7 @@ std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecord
   std::string on_mesh;
   if (std::isfinite(recording.score_on_mesh) && recording.score_on_mesh != recording.score) {
     std::snprintf(number, sizeof number, "%.2f mm", 1000 * recording.score_on_mesh);
-    on_mesh = ", " + std::string(number) + " on the mesh searched";
+    on_mesh = ", " + std::string(number) + " on the mesh of the answer";
   }
   const std::string observed = setting("observed");
   const bool of_markers = observed == "markers" && recording.markers;

@@ -20,11 +20,11 @@ namespace flash::sysid {
 enum class PosteriorMethod { by_count, grids, sampling };
 
 struct AnswerSettings {
-  std::optional<double> repeatability;  ///< trial-to-trial distance of a keyframe [m]
-  bool horizon = true;                  ///< drop keyframes beyond the predictable
-  bool solver_check = true;             ///< solve the estimate again under finer settings
+  std::optional<double> repeatability;                    ///< trial-to-trial distance of a keyframe [m]
+  bool horizon = true;                                    ///< drop keyframes beyond the predictable
+  bool solver_check = true;                               ///< solve the estimate again under finer settings
   PosteriorMethod posterior = PosteriorMethod::by_count;  ///< sampling from three searched parameters on
-  std::vector<Axis> ranges = {};        ///< searched before the grid at hand; empty: its own
+  std::vector<Axis> ranges = {};  ///< searched before the grid at hand; empty: its own
 };
 
 /// The motions of the estimate, and how far they are from what was observed.

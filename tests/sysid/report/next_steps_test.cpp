@@ -108,10 +108,12 @@ TEST(NextSteps, WhatWarningsNameStandsBeforeTheExport) {
   summary.warnings = {
       "lift: the model does not fit: apart from noise of 1.2 mm it misses the cloth by 1.64 mm",
       "young was not measured, and the recordings tell it: search it as well",
-      "cells of 20.2 mm are coarse. Search on cells of 14 mm"};
+      "cells of 20.2 mm are coarse. Search on cells of 14 mm",
+      "the answer is simulated on cells of 16 mm, not on those of 20 mm"};
   const std::vector<std::string> steps = next_steps(summary);
   EXPECT_TRUE(mentions(steps, "young was not measured, and the recordings tell it: search it as well."));
   EXPECT_TRUE(mentions(steps, "Search on cells of 14 mm."));
+  EXPECT_FALSE(mentions(steps, "cells of 16 mm"));               // nothing is left to do about that
   EXPECT_FALSE(mentions(steps, "misses the cloth by 1.64 mm"));  // the step about the misfit says what to do
   EXPECT_TRUE(steps.back().starts_with("Export"));
   EXPECT_FALSE(steps.front().starts_with("Export"));
