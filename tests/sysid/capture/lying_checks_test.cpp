@@ -30,6 +30,15 @@ data::Recording lift_of(const std::string& mesh) {
   return recording;
 }
 
+data::Keyframe seen_at(double t, const std::vector<Eigen::Vector3d>& points) {
+  data::Keyframe keyframe;
+  keyframe.time = t;
+  keyframe.cloud.resize(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    keyframe.cloud.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
+  return keyframe;
+}
+
 /// What is seen of the sheet kRight x kLeft whose diagonal points along kHeading: a fold across the bisector
 /// of its corner parts what is raised from what lies; a corner raised by h has about 2 h of raised cloth,
 /// whose points come inwards.
@@ -44,12 +53,7 @@ std::vector<data::Keyframe> raised_clouds() {
         const Eigen::Vector2d at = Eigen::Vector2d(0.45, -0.3) + turn * Eigen::Vector2d(u, v);
         points.emplace_back(at.x(), at.y(), 0.022 + 0.5 * (reach - u - v));
       }
-    data::Keyframe keyframe;
-    keyframe.time = t;
-    keyframe.cloud.resize(static_cast<Eigen::Index>(points.size()), 3);
-    for (std::size_t i = 0; i < points.size(); ++i)
-      keyframe.cloud.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
-    keyframes.push_back(keyframe);
+    keyframes.push_back(seen_at(t, points));
   }
   return keyframes;
 }
@@ -105,12 +109,7 @@ std::vector<data::Keyframe> bent_clouds() {
         const Eigen::Vector2d at = turn * (Eigen::Vector2d(u, v) + along * (flat / length - 1) * bisector);
         points.emplace_back(0.45 + at.x(), -0.3 + at.y(), 0.012 + height * (1 - along / length));
       }
-    data::Keyframe keyframe;
-    keyframe.time = t;
-    keyframe.cloud.resize(static_cast<Eigen::Index>(points.size()), 3);
-    for (std::size_t i = 0; i < points.size(); ++i)
-      keyframe.cloud.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
-    keyframes.push_back(keyframe);
+    keyframes.push_back(seen_at(t, points));
   }
   return keyframes;
 }
