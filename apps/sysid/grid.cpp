@@ -46,6 +46,14 @@ std::vector<std::string> names_of(const std::vector<data::Recording>& recordings
   return names;
 }
 
+/// Of a hidden option, whose name the parser would leave out of what it says.
+sysid::PosteriorMethod posterior_method(const std::string& name) {
+  if (name.empty()) return sysid::PosteriorMethod::by_count;
+  if (name == "grids") return sysid::PosteriorMethod::grids;
+  if (name == "sampling") return sysid::PosteriorMethod::sampling;
+  throw data::InputError("--posterior: found " + name + ", expected grids or sampling");
+}
+
 sysid::GridSettings grid_settings(const GridOptions& options, const sysid::MaterialBase& base, int threads) {
   sysid::GridSettings settings;
   settings.base = base;
@@ -101,6 +109,7 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
 }
 
 int run_grid(const CLI::App& verb, const GridOptions& options) {
+  const sysid::PosteriorMethod posterior = posterior_method(options.posterior);
   stop_on_signals();
   check_options(options);
   const auto begin = std::chrono::steady_clock::now();
@@ -155,9 +164,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
   asked.horizon = !options.no_horizon;
   asked.solver_check = !options.no_solver_check;
-  if (!options.posterior.empty())
-    asked.posterior =
-        options.posterior == "grids" ? sysid::PosteriorMethod::grids : sysid::PosteriorMethod::sampling;
+  asked.posterior = posterior;
   Search search{asset, std::move(replays), settings, asked, options.map, options.out, begin};
   search.plan = !options.no_plan;
   return run_search(search, store, options.common);
@@ -187,7 +194,6 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_flag("--no-plan", options->no_plan, "Do not say what to record next, which takes simulations");
   verb->add_option("--posterior", options->posterior, "Posteriors on grids, or by importance sampling")
-      ->check(CLI::IsMember({"grids", "sampling"}))
       ->group("");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions, for several searches; without it, motions/ of the run");
