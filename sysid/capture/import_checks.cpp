@@ -146,10 +146,10 @@ std::vector<std::string> contradictions(const data::Recording& recording,
 }
 
 std::string flange_doubt(const data::Recording& recording) {
-  constexpr double kFarthest = 0.4;  // of a flange from its tool [m]
+  constexpr double kFlange = 0.4;  // of a flange from its tool [m]
   const data::Trajectory& trajectory = recording.trajectories.at(recording.grasps.front().gripper);
   const double height = trajectory.poses.front().translation().z() - recording.table_point.z();
-  if (height <= kHighest + recording.nuisance.offset.z() || height > kFarthest) return "";
+  if (height <= kHighest + recording.nuisance.offset.z() || height > kFlange) return "";
   return "it starts " + metres(height) +
          " above the table: is the trajectory that of the flange, in place of the tool centre point?";
 }
