@@ -24,7 +24,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study ridge-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
-.PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
+.PHONY: studies device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -126,6 +126,9 @@ knock-study: configure-test  ## Say whether hand-eye calibration sees knocks nea
 ridge-study: configure-test  ## Say whether posteriors on ridges, straight and bent, of 2 to 6 parameters are right, over 200 draws each
 	cmake --build $(BUILD) -j $(JOBS) --target ridge_study
 	$(BUILD)/tests/ridge_study
+
+studies: configure-test  ## Build all studies
+	cmake --build $(BUILD) -j $(JOBS) --target studies
 
 random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on, of solids with SOLIDS=1, that meet themselves at up to LAYERS=1 m/s, of fast bodies with FAST=1; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
