@@ -142,7 +142,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     grid.axes = sysid::load_grid_file(grid_file).axes;  // the fingerprint holds the rest to it
   } else {
     // The first lattice has all errors of the solution; the answer is by motions that are kept then.
-    sysid::ExpectedWork expected = sysid::expected_work(replays, grid, asked.solver_check);
+    sysid::ExpectedWork expected = sysid::expected_work(replays, grid, asked.solver_check, start.values);
     expected.end += expected.first_look;
     AnswerLine line(options.common, sysid::most_design_work(grid, replays.size()), sysid::TimeLeft(expected),
                     sysid::SearchStage::candidates);

@@ -232,8 +232,10 @@ void AnswerLine::take(const sysid::AnswerWork& done, const sysid::AnswerWork& sp
 
 int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& options) {
   const auto total = static_cast<std::size_t>(sysid::count_candidates(search.settings.axes));
-  const sysid::ExpectedWork expected =
-      sysid::expected_work(search.replays, search.settings, search.asked.solver_check);
+  const auto expected_about = [&](const std::vector<double>& values) {
+    return sysid::expected_work(search.replays, search.settings, search.asked.solver_check, values);
+  };
+  const sysid::ExpectedWork expected = expected_about(sysid::middle_of(search.settings.axes));
   say(options, "then the answer, which takes about as long as " +
                    data::format_count(static_cast<std::size_t>(
                        expected.first_look + expected.lattices * expected.lattice + expected.end)) +
@@ -257,6 +259,8 @@ int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& 
               &stop_on_signals()))
         return kept();
     }
+    if (const int best = sysid::best_of(store.results()); best >= 0)
+      time.expect(expected_about(store.results().candidates[static_cast<std::size_t>(best)].values));
     if (options.verbose) tell_what_was_shared(search.replays, options);
     return conclude(search, store, time, options);
   } catch (const data::Stopped&) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "data/asset/asset_units.h"
+#include "data/asset/plate_rigidity.h"
 #include "data/asset/questioned_numbers.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
@@ -50,10 +51,6 @@ auto value_in(const Names& names, const std::string& name, const std::string& so
 bool is_solid(Constitutive constitutive) {
   return constitutive == Constitutive::tet_arap || constitutive == Constitutive::tet_corotated ||
          constitutive == Constitutive::tet_neohookean || constitutive == Constitutive::tet_neohookean_log;
-}
-
-double plate_rigidity(double youngs_modulus, double poissons_ratio, double thickness) {
-  return youngs_modulus * thickness * thickness * thickness / (12 * (1 - poissons_ratio * poissons_ratio));
 }
 
 void read_mass(const JsonObject& props, Asset& asset) {

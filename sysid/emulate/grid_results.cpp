@@ -1,5 +1,7 @@
 #include "sysid/emulate/grid_results.h"
 
+#include <cmath>
+
 namespace flash::sysid {
 
 const char* to_string(CandidateStatus status) {
@@ -12,6 +14,15 @@ const char* to_string(CandidateStatus status) {
       return "diverged";
   }
   return "";
+}
+
+int best_of(const GridResults& results) {
+  int best = -1;
+  for (std::size_t i = 0; i < results.candidates.size(); ++i)
+    if (std::isfinite(results.candidates[i].score) &&
+        (best < 0 || results.candidates[i].score < results.candidates[static_cast<std::size_t>(best)].score))
+      best = static_cast<int>(i);
+  return best;
 }
 
 std::optional<double> mean_score(const std::vector<KeyframeScore>& keyframes) {

@@ -53,6 +53,9 @@ struct GridResults {
   std::vector<CandidateResult> candidates;
 };
 
+/// The place of the smallest finite score among the candidates; -1 where all diverged.
+int best_of(const GridResults& results);
+
 /// Takes the weight from the keyframes at and beyond each recording's horizon and forms the scores of all
 /// candidates anew from the keyframes that remain. Where none would remain, a recording keeps its own.
 void drop_beyond_horizons(const std::vector<std::optional<double>>& horizons, GridResults& results);

@@ -45,17 +45,22 @@ ReplayCandidate extreme_candidate(const GridSettings& settings, bool limpest) {
   return candidate_at(values, settings);
 }
 
-constexpr double kHalved = 8;  // bending whose cells are coarse, over that of half the cells
+constexpr double most_on_halves = 2 * most_of_fold;  // of the fold, where half the cells are coarse too
 
-/// `below`: the bending from which on cells are not coarse [N m].
-std::string coarse_text(const Replay& replay, double below, double least) {
-  return replay.recording.name + ": cells of " + mm(typical_cell(replay.recording.mesh)) +
-         " are coarse for the fold in which the sheet leaves the table where bending is below " +
-         data::format_short(below) + " N m, and " + data::format_short(least) +
-         " N m is searched: an answer there is simulated on smaller cells, down to half of these, unless "
-         "--no-solver-check is given. Below " +
-         data::format_short(below / kHalved) +
-         " N m it may still be off by a few percent more than is said of it";
+std::string coarse_text(const Replay& replay, const ReplayCandidate& limpest) {
+  const auto below = [&](double most) {
+    return "below " + data::format_short(coarse_below(replay, limpest, most)) + " N m";
+  };
+  const std::string cells = replay.recording.name + ": cells of " + mm(typical_cell(replay.recording.mesh)) +
+                            " are coarse for the fold in which the sheet leaves the table where bending is ",
+                    off = " it may be off by a few percent more than is said of it",
+                    searched =
+                        ", and " + data::format_short(limpest.material.bending_rigidity) + " N m is searched";
+  if (replay.settings.self_contact) return cells + below(most_of_fold) + searched + ": there" + off;
+  return cells + below(most_of_fold_of_answer) + searched +
+         ": an answer there is simulated on smaller cells, down to half of these, unless --no-solver-check "
+         "is given. " +
+         "Bending " + below(most_on_halves) + ":" + off;
 }
 
 }  // namespace
@@ -91,10 +96,12 @@ KnownBefore known_before(const std::vector<Replay>& replays, const GridSettings&
   if (settings.base.solid) return known;
   const ReplayCandidate limpest = limpest_candidate(settings), stiffest = extreme_candidate(settings, false);
   for (const Replay& replay : replays) {
-    const double below = coarse_below(replay, limpest), least = limpest.material.bending_rigidity;
-    if (!(least < below)) continue;
-    const bool all = kHalved * stiffest.material.bending_rigidity < coarse_below(replay, stiffest);
-    (all ? known.warnings : known.notices).push_back(coarse_text(replay, below, least));
+    const bool layers = replay.settings.self_contact.has_value();
+    const double first = layers ? most_of_fold : most_of_fold_of_answer,
+                 last = layers ? most_of_fold : most_on_halves;
+    if (!(limpest.material.bending_rigidity < coarse_below(replay, limpest, first))) continue;
+    const bool all = stiffest.material.bending_rigidity < coarse_below(replay, stiffest, last);
+    (all ? known.warnings : known.notices).push_back(coarse_text(replay, limpest));
   }
   return known;
 }

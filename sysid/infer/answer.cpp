@@ -28,15 +28,6 @@ constexpr double kAbrupt = 1e-3;  // by which motions that can be predicted do n
 
 std::string millimetres(double distance) { return data::format_short(1e3 * distance) + " mm"; }
 
-int best_of(const GridResults& results) {
-  int best = -1;
-  for (std::size_t i = 0; i < results.candidates.size(); ++i)
-    if (std::isfinite(results.candidates[i].score) &&
-        (best < 0 || results.candidates[i].score < results.candidates[static_cast<std::size_t>(best)].score))
-      best = static_cast<int>(i);
-  return best;
-}
-
 /// The values at which no candidate diverged: values that diverge most go first, the best candidate's stay.
 std::vector<Axis> axes_without_diverged(const GridResults& results, const std::vector<double>& best) {
   std::vector<Axis> axes = results.axes;

@@ -7,6 +7,7 @@
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/lattice_about.h"
+#include "sysid/replay/coarse_cells.h"
 #include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/half_cell.h"
 
@@ -19,12 +20,17 @@ constexpr double kFollow = 0.6;      // of looks after which the cells of the sh
 constexpr double kSheetHalved = 4;   // vertices, of half the cells, and of the grasps alone
 constexpr double kGraspsHalved = 1.3;
 
+double vertices_of(const std::vector<Replay>& replays) {
+  double sum = 0;
+  for (const Replay& replay : replays) sum += static_cast<double>(replay.recording.mesh.vertices.rows());
+  return sum;
+}
+
 /// Vertices of the finer mesh over those of the search's.
 double finer_vertices(const std::vector<Replay>& replays) {
-  double own = 0, finer = 0;
+  double finer = 0;
   for (const Replay& replay : replays) {
     const auto vertices = static_cast<double>(replay.recording.mesh.vertices.rows());
-    own += vertices;
     if (!are_graded(replay.recording, replay.settings)) {
       finer += (replay.recording.is_solid() ? 8 : 4) * vertices;
       continue;
@@ -33,7 +39,7 @@ double finer_vertices(const std::vector<Replay>& replays) {
     refine_grasps(replay.settings, 0.25, smaller);
     finer += static_cast<double>(smaller.mesh.vertices.rows());
   }
-  return finer / own;
+  return finer / vertices_of(replays);
 }
 
 }  // namespace
@@ -49,7 +55,10 @@ double time_together(const std::vector<SimulatedTogether>& simulations, int thre
   return std::max(sum, threads * longest);
 }
 
-ExpectedWork expected_work(const std::vector<Replay>& replays, const GridSettings& grid, bool solver_check) {
+namespace {
+
+/// In candidates on the cells of the replays.
+ExpectedWork work_on(const std::vector<Replay>& replays, const GridSettings& grid, bool solver_check) {
   const auto searched = static_cast<double>(std::count_if(
       grid.axes.begin(), grid.axes.end(), [](const Axis& axis) { return axis.values.size() > 1; }));
   const double finer = solver_check ? motion_cost(finer_vertices(replays), 1) : 0;
@@ -80,6 +89,31 @@ ExpectedWork expected_work(const std::vector<Replay>& replays, const GridSetting
                  time_together(at_estimate, threads) + looks + follow;
   work.lattices = 0.5 + searched;
   return work;
+}
+
+}  // namespace
+
+ExpectedWork expected_work(const std::vector<Replay>& replays, const GridSettings& grid, bool solver_check,
+                           const std::vector<double>& values) {
+  const std::vector<Replay> smaller =
+      solver_check ? on_cells_for_fold(replays, candidate_at(values, grid)) : std::vector<Replay>();
+  if (smaller.empty()) return work_on(replays, grid, solver_check);
+  const double each = motion_cost(vertices_of(smaller) / vertices_of(replays), 1);
+  ExpectedWork work = work_on(smaller, grid, solver_check);
+  // The first look on the smaller cells has motions of its own.
+  work.first_look = each * (work.first_look + work.lattice);
+  work.lattice *= each;
+  work.end *= each;
+  return work;
+}
+
+std::vector<double> middle_of(const std::vector<Axis>& axes) {
+  std::vector<double> values;
+  for (const Axis& axis : axes) {
+    const auto [least, most] = std::minmax_element(axis.values.begin(), axis.values.end());
+    values.push_back(axis.logarithmic ? std::sqrt(*least * *most) : (*least + *most) / 2);
+  }
+  return values;
 }
 
 }  // namespace flash::sysid

@@ -31,8 +31,13 @@ double time_together(const std::vector<SimulatedTogether>& simulations, int thre
 /// 2.2 times as long on 1.9 times the vertices, 13 times on 3.8, and 1.3 times with half the step.
 double motion_cost(double vertices, double steps);
 
-/// What is expected of a search. Lattices are one or two for one parameter, and more for more: the demo has
-/// five, the same search on ten times the candidates one.
-ExpectedWork expected_work(const std::vector<Replay>& replays, const GridSettings& grid, bool solver_check);
+/// What is expected of a search whose answer is about `values`, one for each axis: where cells are coarse for
+/// the fold there, its lattices are simulated on smaller ones (on_cells_for_fold). Lattices are one or two
+/// for one parameter, and more for more: the demo has five, the same search on ten times the candidates one.
+ExpectedWork expected_work(const std::vector<Replay>& replays, const GridSettings& grid, bool solver_check,
+                           const std::vector<double>& values);
+
+/// The middle of what is searched.
+std::vector<double> middle_of(const std::vector<Axis>& axes);
 
 }  // namespace flash::sysid

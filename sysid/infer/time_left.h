@@ -14,6 +14,9 @@ class TimeLeft {
  public:
   explicit TimeLeft(const ExpectedWork& expected) : expected_(expected) {}
 
+  /// Parts to come in place of those expected before, in the same unit.
+  void expect(const ExpectedWork& work) { expected_ = work; }
+
   /// `seconds_each`: of one candidate [s]; `left`: candidates.
   void take_candidates(double left, double seconds_each);
 

@@ -33,9 +33,9 @@ double weight_on_table(const Replay& replay, const ReplayCandidate& candidate) {
 
 }  // namespace
 
-double coarse_below(const Replay& replay, const ReplayCandidate& heaviest) {
+double coarse_below(const Replay& replay, const ReplayCandidate& heaviest, double most) {
   const double weight = weight_on_table(replay, heaviest);
-  return weight > 0 ? weight * std::pow(typical_cell(replay.recording.mesh) / most_of_fold, 3) : 0;
+  return weight > 0 ? weight * std::pow(typical_cell(replay.recording.mesh) / most, 3) : 0;
 }
 
 std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays, const ReplayCandidate& candidate,
@@ -58,10 +58,10 @@ std::string mm(double length) { return data::format_short(std::round(1e4 * lengt
 }  // namespace
 
 std::vector<Replay> on_cells_for_fold(const std::vector<Replay>& replays, const ReplayCandidate& candidate) {
-  constexpr double kOfFold = 0.375, kAsMuch = 1.05;
+  constexpr double kOfFold = 0.375;
   for (const Replay& replay : replays)
     if (replay.settings.self_contact) return {};
-  const auto coarse = coarse_cells(replays, candidate, kAsMuch * kOfFold);
+  const auto coarse = coarse_cells(replays, candidate, most_of_fold_of_answer);
   if (!coarse) return {};
   return on_smaller_cells(replays, std::max(0.5, kOfFold * coarse->radius / coarse->cell));
 }

@@ -22,14 +22,17 @@ struct CoarseCells {
 
 inline constexpr double most_of_fold = 0.5;
 
+/// From this share on an answer has smaller cells (on_cells_for_fold).
+inline constexpr double most_of_fold_of_answer = 0.394;
+
 /// Of the first recording in which they take more than `most` of the radius; empty where there is none: cells
 /// are smaller, or there is no table, no weight, no bending or a solid.
 std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays, const ReplayCandidate& candidate,
                                         double most = most_of_fold);
 
-/// The bending rigidity below which cells of a recording are coarse, of the heaviest candidate [N m]; 0 where
-/// they never are.
-double coarse_below(const Replay& replay, const ReplayCandidate& heaviest);
+/// The bending rigidity below which cells of a recording take more than `most` of the radius, of the heaviest
+/// candidate [N m]; 0 where they never do.
+double coarse_below(const Replay& replay, const ReplayCandidate& heaviest, double most = most_of_fold);
 
 /// What a warning says of them.
 std::string coarse_cells_text(const CoarseCells& coarse);

@@ -38,7 +38,8 @@ TEST(RandomScenes, WithRoundObstaclesAreSolvedOrSaidNotToBe) {
     unsolved += found.unconverged > 0;
   }
   EXPECT_LE(unsolved, 1);
-  for (const unsigned long seed : {1, 2, 4, 5}) {  // 3 takes two minutes, with steps that are said not to be solved
+  for (const unsigned long seed :
+       {1, 2, 4, 5}) {  // 3 takes two minutes, with steps that are said not to be solved
     const SceneFindings found = observe(random_deep_start(seed, {.round = 1}));
     EXPECT_TRUE(found.finite) << seed;
     EXPECT_LT(found.unseen_depth, 1e-4) << seed;

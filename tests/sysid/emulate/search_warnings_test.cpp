@@ -21,7 +21,7 @@ TEST(SearchWarnings, CoarseCellsAreToldBeforeASearchOfWhereTheyAre) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_corner_lift(folder, 0.1)};
   const double weight = 9.81 * short_lift_material().areal_density,
-               below = weight * std::pow(typical_cell(replays[0].recording.mesh) / 0.5, 3);
+               below = weight * std::pow(typical_cell(replays[0].recording.mesh) / most_of_fold_of_answer, 3);
   const auto known = [&](double low, double high) {
     return known_before(replays, search_of({low * below, high * below}));
   };
@@ -35,8 +35,25 @@ TEST(SearchWarnings, CoarseCellsAreToldBeforeASearchOfWhereTheyAre) {
       << known(0.5, 4).notices[0];
   EXPECT_EQ(known(0.5, 0.9).notices.size(), 1u);
   // All of it is below what half of the cells take.
-  EXPECT_TRUE(known(0.05, 0.12).notices.empty());
-  EXPECT_EQ(known(0.05, 0.12).warnings.size(), 1u);
+  const double halves = std::pow(most_of_fold_of_answer, 3);
+  EXPECT_TRUE(known(0.5 * halves, 0.99 * halves).notices.empty());
+  EXPECT_EQ(known(0.5 * halves, 0.99 * halves).warnings.size(), 1u);
+  EXPECT_TRUE(known(0.5 * halves, 1.01 * halves).warnings.empty());
+}
+
+// Layers keep the cells of the search.
+TEST(SearchWarnings, CoarseCellsOfLayersAreSaidToStay) {
+  const data::TemporaryFolder folder;
+  std::vector<Replay> replays = {short_corner_lift(folder, 0.1)};
+  replays[0].settings.self_contact = sim::SelfContact{.thickness = 1e-3};
+  const double weight = 9.81 * short_lift_material().areal_density,
+               below = weight * std::pow(typical_cell(replays[0].recording.mesh) / most_of_fold, 3);
+  EXPECT_TRUE(known_before(replays, search_of({1.01 * below, 4 * below})).notices.empty());
+  const std::vector<std::string> notices = known_before(replays, search_of({0.5 * below, 4 * below})).notices;
+  ASSERT_EQ(notices.size(), 1u);
+  EXPECT_EQ(notices[0].find("smaller cells"), std::string::npos) << notices[0];
+  EXPECT_NE(notices[0].find("may be off by a few percent"), std::string::npos) << notices[0];
+  EXPECT_EQ(known_before(replays, search_of({0.5 * below, 0.9 * below})).warnings.size(), 1u);
 }
 
 TEST(SearchWarnings, AnEstimateToGoOnFromIsTheWholeRange) {
