@@ -146,7 +146,7 @@ def _say_camera(camera, said):
     for picture in filter(None, (camera.colour, camera.depth)):
         scale = f", {camera.scale:g} m a count" if picture is camera.depth else ""
         said(f"{'depth' if picture.depth else 'pictures'}: {picture.name}, {picture.count} of {picture.encoding}"
-             f"{_rate(camera.stamps[picture.name])}{scale}")
+             f"{_rate(camera.stamps[picture.name].times)}{scale}")
     if camera.align is not None:
         said(f"depth is reprojected onto {camera.colour.name} by the recording's extrinsics")
 

@@ -8,6 +8,7 @@ from flash_sim.bag.errors import refusal
 
 FARTHEST = 1.0    # between two cameras of one device [m]
 LARGEST_HOLE = 8  # pixels of the colour that one of the depth may cover, along a side
+SEAM = 0.1        # by which neighbours of a slope may part, in pixels of the colour
 NEAREST = 1e-3    # of a depth that counts [m]
 
 
@@ -33,17 +34,18 @@ def colour_from_depth(recording, colour, depth, colour_lens, depth_lens, tree):
 def reprojected(metres, depth_lens, colour_lens, colour_from_depth):
     """Depth of the colour camera (h, w) float32 [m], not a number where none falls.
 
-    metres: (h, w), 0 or not a number where nothing was measured. Each pixel becomes the rectangle of its two corners, as
-    RealSense aligns; where several fall on a pixel the nearest counts.
+    metres: (h, w), 0 or not a number where nothing was measured. Each pixel becomes the rectangle about its four corners;
+    where several fall on a pixel the nearest counts.
     """
     y, x = np.nonzero(metres > NEAREST)
     z = metres[y, x].astype(np.float64)
-    corners = [_seen(np.stack([x, y], axis=1) + shift, z, depth_lens, colour_lens, colour_from_depth) for shift in (-0.5, 0.5)]
-    depth = corners[0][1] / 2 + corners[1][1] / 2
-    low = np.ceil(np.minimum(corners[0][0], corners[1][0])).astype(np.int64)
-    high = np.ceil(np.maximum(corners[0][0], corners[1][0])).astype(np.int64) - 1
+    corners = [_seen(np.stack([x + across, y + down], axis=1), z, depth_lens, colour_lens, colour_from_depth)
+               for across in (-0.5, 0.5) for down in (-0.5, 0.5)]
+    depth = sum(corner[1] for corner in corners) / 4
+    least, most = (pick.reduce([corner[0] for corner in corners]) for pick in (np.minimum, np.maximum))
+    low, high = np.ceil(least - SEAM).astype(np.int64), np.ceil(most + SEAM).astype(np.int64) - 1
     small = high < low  # no centre of a pixel lies in it
-    low[small] = high[small] = np.floor((corners[0][0] + corners[1][0])[small] / 2 + 0.5)
+    low[small] = high[small] = np.floor((least + most)[small] / 2 + 0.5)
     high = np.minimum(high, low + LARGEST_HOLE - 1)
     nearest = np.full((colour_lens.height, colour_lens.width), np.inf)
     size = (high - low).max(axis=0) + 1 if len(z) else (0, 0)

@@ -11,6 +11,17 @@ from flash_sim.bag.lens import Lens, expect_size, lens_of
 from flash_sim.bag.pictures import depth_of, frame_of, picture_of, stamp_of
 
 
+LARGEST_DELAY = 300_000_000  # by which what belongs together may arrive apart [ns]
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """When the messages of a topic were stamped."""
+
+    times: np.ndarray  # (n,) of the headers [ns], in order
+    delay: int         # from there to the log, in the middle [ns]
+
+
 @dataclass(frozen=True)
 class Camera:
     """Colour, depth or both, on the same pixels."""
@@ -21,7 +32,7 @@ class Camera:
     depth_lens: Lens | None        # of the depth as it is recorded
     align: np.ndarray | None       # T_colour_depth (4, 4) of depth that is on other pixels
     scale: float                   # [m] a count of the depth
-    stamps: dict                   # of each topic (n,) [ns], in order
+    stamps: dict                   # of each topic its Stamps
     info_stamps: dict              # of each topic those of its camera_info
 
     @property
@@ -35,7 +46,7 @@ def open_camera(recording, colour, depth, tree, scale=None, own_lens=False):
     file has the lens. Throws RecordingError."""
     lenses, info_stamps = {}, {}
     for picture in filter(None, (colour, depth)):
-        lenses[picture.name], info_stamps[picture.name] = (None, np.empty(0, np.int64)) if own_lens else _lens(recording, picture)
+        lenses[picture.name], info_stamps[picture.name] = (None, Stamps(np.empty(0, np.int64), 0)) if own_lens else _lens(recording, picture)
     align = None
     if colour and depth and own_lens and not (depth.aligned or depth.frame == colour.frame):
         raise refusal(recording.path, depth.name, f"found depth in the frame {depth.frame} beside {colour.name} in {colour.frame} and one "
@@ -51,11 +62,13 @@ def open_camera(recording, colour, depth, tree, scale=None, own_lens=False):
 
 def between(camera, start, end):
     """The camera with pictures from `start` to `end` only, seconds since the first; None: all."""
-    first = int(camera.stamps[camera.main.name][0])
+    main = camera.main.name
+    stamps = camera.stamps[main]
+    first = int(stamps.times[0])
     low = first + round((start or 0) * streams.SECOND)
     high = first + round(end * streams.SECOND) if end is not None else np.iinfo(np.int64).max
-    return replace(camera, stamps={name: stamps[(stamps >= low) & (stamps <= high)] if name == camera.main.name else stamps
-                                   for name, stamps in camera.stamps.items()})
+    inside = stamps.times[(stamps.times >= low) & (stamps.times <= high)]
+    return replace(camera, stamps={**camera.stamps, main: replace(stamps, times=inside)})
 
 
 def pictures(recording, camera, wanted):
@@ -102,30 +115,33 @@ def lens_text(camera, path):
         raise refusal(path, f"cannot be read: {error.strerror}") from error
 
 
-def paired_depth(camera, said):
+def paired_depth(path, camera, said):
     """Pairs of the colour with the depth; None without both. Says the skew. Throws RecordingError where most are too far apart."""
     if not (camera.colour and camera.depth):
         return None
-    return _paired(camera.stamps[camera.colour.name], camera.stamps[camera.depth.name], camera.colour.name, camera.depth.name, said)
+    return _paired(path, camera.stamps[camera.colour.name], camera.stamps[camera.depth.name], camera.colour.name, camera.depth.name,
+                   said)
 
 
 def compare_infos(path, camera, said):
     """Says the skew of pictures and their camera_info, where that comes as often. Throws RecordingError beyond half a frame."""
     for picture in filter(None, (camera.colour, camera.depth)):
         stamps, infos = camera.stamps[picture.name], camera.info_stamps[picture.name]
-        if len(infos) < 2 or len(infos) < 0.8 * picture.count:
-            continue
-        streams.expect_one_clock(path, picture.name, stamps, "its camera_info", infos)
-        _paired(stamps, infos, picture.name, "its camera_info", said)
+        if len(infos.times) > 1 and len(infos.times) >= 0.8 * picture.count:
+            _paired(path, stamps, infos, picture.name, "its camera_info", said)
 
 
-def _paired(stamps, others, name, other, said):
-    pairs = streams.paired(stamps, others)
+def _paired(path, stamps, others, name, other, said):
+    streams.expect_one_clock(path, name, stamps.times, other, others.times)
+    if abs(stamps.delay - others.delay) > LARGEST_DELAY:
+        raise refusal(path, f"{name} and {other}", f"found stamps that are {(stamps.delay - others.delay) * 1e-9:+.3f} s apart for what "
+                                                   "arrived together, expected one clock: what was seen at one time is not known")
+    pairs = streams.paired(stamps.times, others.times)
     said(pairs.text(name, other))
     if pairs.belong.mean() < 0.5:
         middle = np.median(np.abs(pairs.skew)) * 1e-6
-        raise refusal(f"{name} and {other}", f"found stamps {middle:.1f} ms apart, expected less than half a frame, "
-                                             f"{pairs.half_frame * 1e-6:.1f} ms: what was seen at one time is not known")
+        raise refusal(path, f"{name} and {other}", f"found stamps {middle:.1f} ms apart, expected less than half a frame, "
+                                                   f"{pairs.half_frame * 1e-6:.1f} ms: what was seen at one time is not known")
     return pairs
 
 
@@ -133,32 +149,34 @@ def _lens(recording, picture):
     """The lens of a PictureTopic, the same in all messages, and their stamps."""
     topic = choice.info_topic(recording, picture)
     where = f"{recording.path}: {topic}"
-    lens, stamps = None, []
-    for _, message in recording.messages([topic]):
+    lens, stamps, delays = None, [], []
+    for _, time, message in recording.logged_messages([topic]):
         found = lens_of(message, where, picture.rectified)
         if lens not in (None, found):
             raise refusal(where, f"found two lenses (fx {lens.fx:.6g} and {found.fx:.6g}, {lens.size} and {found.size} px), expected one "
                                  "all the time")
         lens = found
         stamps.append(stamp_of(message))
-    return lens, np.unique(stamps)
+        delays.append(time - stamps[-1])
+    return lens, Stamps(np.unique(stamps), int(np.median(delays)))
 
 
 def _stamps(recording, wanted):
-    """Of each topic those of its pictures (n,) [ns], in order."""
-    found = {picture.name: [] for picture in wanted}
+    """Of each topic the Stamps of its pictures."""
+    found, delays = {picture.name: [] for picture in wanted}, {picture.name: [] for picture in wanted}
     frames = {picture.name: picture.frame for picture in wanted}
-    for topic, message in recording.messages(found):
+    for topic, time, message in recording.logged_messages(found):
         if frame_of(message) != frames[topic]:
             raise refusal(recording.path, topic, f"found pictures in the frames {frames[topic]} and {frame_of(message)}, expected one")
         found[topic].append(stamp_of(message))
+        delays[topic].append(time - found[topic][-1])
     for topic, stamps in found.items():
         if not any(stamps):
             raise refusal(recording.path, topic, "found the stamp 0 in every header, expected the time at which a picture was taken")
         if len(set(stamps)) < len(stamps):
             raise refusal(recording.path, topic, f"found {len(stamps) - len(set(stamps))} pictures with the stamp of another, expected "
                                                  "one a stamp: was the bag recorded while it was played, or twice?")
-    return {topic: np.sort(np.asarray(stamps, np.int64)) for topic, stamps in found.items()}
+    return {topic: Stamps(np.sort(np.asarray(stamps, np.int64)), int(np.median(delays[topic]))) for topic, stamps in found.items()}
 
 
 def _size(size):

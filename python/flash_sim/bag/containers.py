@@ -28,7 +28,7 @@ class Topic:
 
 
 class Recording:
-    """An open recording; a context manager. Messages come in the order of their log times, which nothing else is read from."""
+    """An open recording; a context manager. Messages come in the order of their log times, which nothing else is made of."""
 
     def __init__(self, path):
         """Throws RecordingError, one line, where the file is not there or is none that can be read."""
@@ -53,17 +53,22 @@ class Recording:
 
     def messages(self, names):
         """(topic name, message) of these topics. Throws RecordingError of what is damaged or of an unknown type."""
+        for topic, _, message in self.logged_messages(names):
+            yield topic, message
+
+    def logged_messages(self, names):
+        """(topic name, log time [ns], message), likewise."""
         names = set(names)
         wanted = [connection for connection in self._reader.connections if connection.topic in names]
         if not wanted:
             return
         topic = ""
         with _told(self.path):
-            for connection, _, raw in self._reader.messages(connections=wanted):
+            for connection, time, raw in self._reader.messages(connections=wanted):
                 topic = connection.topic
                 with _told(self.path, topic):
                     message = self._message(connection, bytes(raw))
-                yield topic, message
+                yield topic, int(time), message
 
     def first(self, name):
         """The first message of a topic; None where there is none."""

@@ -26,11 +26,12 @@ def write_hand_eye(recording, camera, stream, folder, settings, said):
     of the command line. Throws RecordingError."""
     if camera.colour is None:
         raise refusal(recording.path, "found no pictures (sensor_msgs/Image or CompressedImage of eight bits), expected those of a target")
-    pairs = cameras.paired_depth(camera, said)
-    name, stamps = camera.colour.name, camera.stamps[camera.colour.name]
+    pairs = cameras.paired_depth(recording.path, camera, said)
+    name = camera.colour.name
+    stamps = camera.stamps[name].times
     if pairs is not None:
         said.left_out(name, int((~pairs.belong).sum()), "have no depth within half a frame")
-        camera = replace(camera, stamps={**camera.stamps, name: stamps[pairs.belong]})
+        camera = replace(camera, stamps={**camera.stamps, name: replace(camera.stamps[name], times=stamps[pairs.belong])})
     cameras.compare_infos(recording.path, camera, said)
     views = _views(recording.path, camera, stream, settings, said)
     depth_of = _depth_stamps(camera, pairs, stamps, views)
@@ -47,7 +48,7 @@ def write_hand_eye(recording, camera, stream, folder, settings, said):
 
 def _views(path, camera, stream, settings, said):
     """Which pictures to keep: one of each stop; or, every so often, those of a moving arm with the poses over time."""
-    name, stamps = camera.colour.name, camera.stamps[camera.colour.name]
+    name, stamps = camera.colour.name, camera.stamps[camera.colour.name].times
     if stream is None:
         chosen = _thinned(stamps, settings.every or 0)
         return Views(chosen, [streams.seconds(stamp) for stamp in chosen], None)
@@ -90,7 +91,7 @@ def _depth_stamps(camera, pairs, stamps, views):
     """The stamp of the depth of each view, by the stamp of the view; empty without depth."""
     if pairs is None:
         return {}
-    depth = camera.stamps[camera.depth.name]
+    depth = camera.stamps[camera.depth.name].times
     index = np.searchsorted(stamps, views.stamps)
     return {int(stamp): int(depth[pairs.nearest[k]]) for stamp, k in zip(views.stamps, index)}
 

@@ -18,11 +18,11 @@ def write_lift(recording, camera, stream, tree, folder, settings, said):
     T_base_gripper, None: it is left out. Throws RecordingError."""
     if camera.depth is None:
         raise refusal(recording.path, "found no depth (sensor_msgs/Image of 16UC1 or 32FC1, or compressedDepth), expected that of a lift")
-    pairs = cameras.paired_depth(camera, said)
+    pairs = cameras.paired_depth(recording.path, camera, said)
     cameras.compare_infos(recording.path, camera, said)
-    colour_stamps = camera.stamps[camera.colour.name] if pairs else camera.stamps[camera.depth.name]
+    colour_stamps = camera.stamps[camera.main.name].times
     belong = pairs.belong if pairs else np.ones(len(colour_stamps), bool)
-    depth_stamps = camera.stamps[camera.depth.name][pairs.nearest] if pairs else colour_stamps
+    depth_stamps = camera.stamps[camera.depth.name].times[pairs.nearest] if pairs else colour_stamps
     said.left_out(camera.main.name, int((~belong).sum()), "have no depth within half a frame")
     frames = dict(zip(map(int, depth_stamps[belong]), map(int, colour_stamps[belong])))
     times = np.array(sorted(frames), np.int64)

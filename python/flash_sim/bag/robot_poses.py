@@ -155,6 +155,9 @@ def _pose(message, where):
     """Place (3,) and quaternion (4,) of a message of POSE_KINDS."""
     if hasattr(message, "O_T_EE"):  # column by column
         matrix = np.asarray(message.O_T_EE, np.float64).reshape(4, 4).T
+        if np.abs(matrix[3] - [0, 0, 0, 1]).max() > rigid.ROTATION_TOLERANCE:
+            raise refusal(*where, "O_T_EE", f"found the last row {', '.join(f'{value:.4g}' for value in matrix[3])}, expected 0, 0, 0, 1: "
+                                            "was it written row by row?")
         return matrix[:3, 3], rigid.quaternion_of(rigid.expect_rotation(matrix[:3, :3], *where, "O_T_EE"))
     if hasattr(message, "transform"):
         t, r = message.transform.translation, message.transform.rotation
