@@ -10,6 +10,7 @@ START = 1_764_402_133 * SECOND + 299_000_000  # of a unix clock [ns]
 LATE = 80_000_000  # of the log after the header [ns]
 EXTRINSICS = "std_msgs/Header header\nfloat64[9] rotation\nfloat64[3] translation\n"
 FRANKA = "std_msgs/Header header\nfloat64[16] O_T_EE\n"
+FRANKA_TWO = "std_msgs/Header header\ngeometry_msgs/PoseStamped o_t_ee\n"
 TF_MESSAGE = "geometry_msgs/TransformStamped[] transforms\n"
 CONTAINERS = ("ros1", "sqlite_folder", "mcap_folder", "db3", "mcap")
 
@@ -158,7 +159,8 @@ def _store(name):
     from rosbags.typesys import get_types_from_msg, get_typestore
     store = get_typestore(name)
     for kind, text in (("realsense2_camera_msgs/msg/Extrinsics", EXTRINSICS), ("orbbec_camera_msgs/msg/Extrinsics", EXTRINSICS),
-                       ("franka_msgs/msg/FrankaState", FRANKA), ("tf2_msgs/msg/TFMessage", TF_MESSAGE)):
+                       ("franka_msgs/msg/FrankaState", FRANKA), ("franka_msgs/msg/FrankaRobotState", FRANKA_TWO),
+                       ("tf2_msgs/msg/TFMessage", TF_MESSAGE)):
         if kind not in store.fielddefs:
             store.register(get_types_from_msg(text, kind))
     return store

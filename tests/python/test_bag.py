@@ -177,6 +177,15 @@ def test_log_times_change_nothing(tmp_path, wrist):
     assert folders[0] == folders[1]
 
 
+def test_clocks_that_arrive_apart_are_warned_of(tmp_path, wrist, capsys):
+    """By a second: no stamp by itself tells."""
+    other = Cell()
+    other.entries = [(topic, kind, time + (SECOND if topic == "/tf" else 0), fields) for topic, kind, time, fields in wrist.entries]
+    assert main([str(other.write(tmp_path, "mcap")), "-o", str(tmp_path / "set"), "--quiet"]) == 0
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and f"warning: stamps of {PICTURES} lie -1.000 s farther" in error and "/tf" in error
+
+
 def test_the_compiled_part_is_not_needed(tmp_path, wrist):
     """In a process that has no such module."""
     source = wrist.write(tmp_path, "mcap")

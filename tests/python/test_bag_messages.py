@@ -86,6 +86,7 @@ def test_kinematics_from_one_link_to_another():
 @pytest.mark.parametrize("kind, fields", [
     ("geometry_msgs/msg/PoseStamped", lambda p: {"pose": p}),
     ("geometry_msgs/msg/PoseWithCovarianceStamped", lambda p: {"pose": {"pose": p}}),
+    ("franka_msgs/msg/FrankaRobotState", lambda p: {"o_t_ee": {"pose": p}}),
     ("nav_msgs/msg/Odometry", lambda p: {"pose": {"pose": p}}),
     ("geometry_msgs/msg/TransformStamped", lambda p: {"transform": {"translation": p["position"], "rotation": p["orientation"]}})])
 def test_topics_of_poses(tmp_path, kind, fields):

@@ -5,7 +5,7 @@ import shlex
 import signal
 import sys
 
-from flash_sim.bag import choice, hand_eye_folder, lift_folder
+from flash_sim.bag import arrival, choice, hand_eye_folder, lift_folder
 from flash_sim.bag.camera import between, open_camera
 from flash_sim.bag.containers import Recording
 from flash_sim.bag.errors import RecordingError
@@ -33,10 +33,15 @@ class Said:
         if not self._quiet:
             print(text, flush=True)
 
+    def warning(self, text):
+        """On stderr, unless it is empty."""
+        if text:
+            print(f"{NAME}: warning: {text}", file=sys.stderr)
+
     def left_out(self, topic, count, why):
         """Of pictures, where there are any."""
         if count:
-            print(f"{NAME}: warning: {topic}: {count} pictures {why} and are left out", file=sys.stderr)
+            self.warning(f"{topic}: {count} pictures {why} and are left out")
 
 
 class Parser(argparse.ArgumentParser):
@@ -112,7 +117,7 @@ def convert(recording, settings, said):
     read = [path for path in (settings.recording, settings.urdf, settings.poses, settings.camera_info, settings.extrinsics) if path]
     folder = StagedFolder(settings.out, settings.force, read)
     tree = read_transforms(recording)
-    stream = _robot(recording, tree, settings, said)
+    stream, topic = _robot(recording, tree, settings, said)
     colour, depth = choice.choose_pictures(recording.path, choice.survey(recording), settings.topics)
     if settings.reader == "segment" and depth is None:
         cloud = choice.choose_cloud(recording, settings.topics)
@@ -124,6 +129,9 @@ def convert(recording, settings, said):
     camera = between(open_camera(recording, colour, depth, tree, settings.depth_scale, bool(settings.camera_info)), settings.start,
                      settings.end)
     _say_camera(camera, said)
+    if topic:
+        main = camera.main.name
+        said.warning(arrival.doubt(camera.stamps[main].delay, arrival.delay_of(recording, topic), main, topic))
     with folder:
         if settings.reader == "segment":
             return lift_folder.write_lift(recording, camera, stream, tree, folder, settings, said)
@@ -131,15 +139,15 @@ def convert(recording, settings, said):
 
 
 def _robot(recording, tree: TransformTree, settings, said):
-    """The stream of T_base_tool; None where it is left out."""
+    """The stream of T_base_tool, None where it is left out; and its topic, if it has one."""
     if settings.without_poses:
-        return None
+        return None, ""
     if settings.poses:
-        return read_tum(settings.poses)
+        return read_tum(settings.poses), ""
     topics = pose_topics(recording, tree, settings.topics)
     stream = read_robot_poses(recording, tree, topics, settings.base, settings.tool, settings.urdf)
     said(f"poses: {stream.source}, {len(stream.times)} of them{_rate(stream.times)}")
-    return stream
+    return stream, topics[0]
 
 
 def _say_camera(camera, said):

@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flash_sim.bag import alignment, choice, png, streams
+from flash_sim.bag.arrival import LARGEST_DELAY
 from flash_sim.bag.depth_scale import MILLIMETRES, depth_scale
 from flash_sim.bag.errors import refusal
 from flash_sim.bag.lens import Lens, expect_size, lens_of
 from flash_sim.bag.pictures import depth_of, frame_of, picture_of, stamp_of
-
-
-LARGEST_DELAY = 300_000_000  # by which what belongs together may arrive apart [ns]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from flash_sim.bag.transforms import TF_KINDS
 POSE_KINDS = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/TransformStamped",
               "nav_msgs/Odometry", "franka_msgs/FrankaState", "franka_msgs/FrankaRobotState")
 JOINT_KIND, DESCRIPTION = "sensor_msgs/JointState", "robot_description"
-BASES = ("base", "base_link", "panda_link0", "fr3_link0", "fer_link0", "link_base", "base_footprint", "world")
+BASES = ("base_link", "panda_link0", "fr3_link0", "fer_link0", "link_base", "base", "base_footprint", "world")
 TOOLS = ("tcp", "tool0", "panda_hand_tcp", "fr3_hand_tcp", "fer_hand_tcp", "link_tcp", "tool_link", "ee_link", "panda_hand", "fr3_hand",
          "flange", "panda_link8", "fr3_link8", "gripper")
 FEW = 12  # names in a message

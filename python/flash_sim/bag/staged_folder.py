@@ -1,4 +1,5 @@
 """A folder that readers see whole or not at all."""
+import contextlib
 import os
 import pathlib
 import re
@@ -24,6 +25,7 @@ class StagedFolder:
         if self.final.exists() and any(self.final.iterdir()) and not force:
             raise refusal(path, "exists already; choose another name, or --force to overwrite")
         self.path = self.final.with_name(f"{self.final.name}.{os.getpid()}-0.tmp")
+        self._made = [parent for parent in self.final.parents if not parent.exists()]
 
     def __enter__(self):
         try:
@@ -38,6 +40,9 @@ class StagedFolder:
                 self._publish()
         finally:
             shutil.rmtree(self.path, ignore_errors=True)
+            for parent in self._made if kind is not None else ():
+                with contextlib.suppress(OSError):  # something is in it
+                    parent.rmdir()
 
     def write(self, name, content):
         """A file below the folder, of text or bytes."""
