@@ -106,7 +106,7 @@ def between(a, b, share):
     turn = a[:3, :3].T @ b[:3, :3]
     angle = np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))
     axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    way = rotation(axis, share * angle) if angle > 1e-9 else np.eye(3)
+    way = rotation(axis, share * angle) if angle > 1e-6 else np.eye(3)
     return pose((1 - share) * a[:3, 3] + share * b[:3, 3], a[:3, :3] @ way)
 
 

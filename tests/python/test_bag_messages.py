@@ -266,11 +266,11 @@ def test_reprojection_against_rays(tmp_path):
     def seen(lens, n, d):
         y, x = np.indices((lens.height, lens.width))
         rays = lens.directions(np.stack([x.ravel(), y.ravel()], axis=1).astype(float))
-        assert np.abs(lens.project(np.column_stack([rays, np.ones(len(rays))])) - np.stack([x.ravel(), y.ravel()], axis=1)).max() < 1e-6
+        assert np.abs(lens.seen(*rays.T) - np.stack([x.ravel(), y.ravel()])).max() < 1e-6
         return (d / (rays @ n[:2] + n[2])).reshape(lens.height, lens.width)
     turned = matrix[:3, :3] @ normal
     expected = seen(colour_lens, turned, offset + turned @ matrix[:3, 3])
-    found = alignment.reprojected(seen(depth_lens, normal, offset), depth_lens, colour_lens, matrix)
+    found = alignment.Reprojection(depth_lens, colour_lens, matrix)(seen(depth_lens, normal, offset))
     middle = found[8:-8, 8:-8]
     assert np.isfinite(middle).all()
     # Half a pixel of the depth, and a seam, off in x and in y: each times the slope of depth, z^2 n / offset, over 70 px.

@@ -31,40 +31,64 @@ def colour_from_depth(recording, colour, depth, colour_lens, depth_lens, tree):
                   "/tf_static or aligned depth; --topics takes one of them alone")
 
 
-def reprojected(metres, depth_lens, colour_lens, colour_from_depth):
-    """Depth of the colour camera (h, w) float32 [m], not a number where none falls.
+class Reprojection:
+    """Pictures of depth as the colour camera would have them.
 
-    metres: (h, w), 0 or not a number where nothing was measured. Each pixel becomes the rectangle about its four corners;
-    where several fall on a pixel the nearest counts.
+    Each pixel becomes the rectangle about its four corners; where several fall on a pixel the nearest counts.
     """
-    y, x = np.nonzero(metres > NEAREST)
-    z = metres[y, x].astype(np.float64)
-    corners = [_seen(np.stack([x + across, y + down], axis=1), z, depth_lens, colour_lens, colour_from_depth)
-               for across in (-0.5, 0.5) for down in (-0.5, 0.5)]
-    depth = sum(corner[1] for corner in corners) / 4
-    least, most = (pick.reduce([corner[0] for corner in corners]) for pick in (np.minimum, np.maximum))
+
+    def __init__(self, depth_lens, colour_lens, colour_from_depth):
+        """The lenses, and T_colour_depth (4, 4)."""
+        self._lens, self._place = colour_lens, colour_from_depth[:3, 3]
+        turn = colour_from_depth[:3, :3].T
+        self._corners = _rays(depth_lens, depth_lens.height + 1, depth_lens.width + 1, -0.5) @ turn
+        self._forward = _rays(depth_lens, depth_lens.height, depth_lens.width, 0) @ turn[:, 2]
+
+    def __call__(self, metres):
+        """Depth of the colour camera (h, w) float32 [m], not a number where none falls. metres: (h, w), 0 where nothing was measured."""
+        height, width = metres.shape
+        seen = metres > NEAREST
+        z = metres[seen].astype(np.float64)
+        depth = z * self._forward[seen] + self._place[2]
+        least, most = (np.full((2, len(z)), value) for value in (1e6, -1e6))
+        for down in (0, 1):
+            for across in (0, 1):
+                pixels = self._pixels(self._corners[down:height + down, across:width + across][seen], z)
+                np.minimum(least, pixels, out=least)
+                np.maximum(most, pixels, out=most)
+        return _nearest(self._lens, least, most, depth)
+
+    def _pixels(self, rays, z):
+        """(2, n) of the ends of rays (n, 3); far outside where these are behind the camera."""
+        x, y, forward = (rays[:, k] * z + self._place[k] for k in range(3))
+        behind = forward <= NEAREST
+        forward[behind] = 1
+        pixels = np.clip(self._lens.seen(x / forward, y / forward), -1e6, 1e6)
+        pixels[:, behind] = -1e6
+        return pixels
+
+
+def _nearest(lens, least, most, depth):
+    """The picture of rectangles from `least` to `most` (2, n) [px] at depths (n,)."""
     low, high = np.ceil(least - SEAM).astype(np.int64), np.ceil(most + SEAM).astype(np.int64) - 1
     small = high < low  # no centre of a pixel lies in it
     low[small] = high[small] = np.floor((least + most)[small] / 2 + 0.5)
     high = np.minimum(high, low + LARGEST_HOLE - 1)
-    nearest = np.full((colour_lens.height, colour_lens.width), np.inf)
-    size = (high - low).max(axis=0) + 1 if len(z) else (0, 0)
-    for across in range(int(size[0])):
-        for down in range(int(size[1])):
-            at = low + [across, down]
-            inside = ((at <= high) & (at >= 0) & (at < [colour_lens.width, colour_lens.height])).all(axis=1) & (depth > NEAREST)
-            np.minimum.at(nearest, (at[inside, 1], at[inside, 0]), depth[inside])
+    nearest = np.full((lens.height, lens.width), np.inf)
+    sides = (high - low).max(axis=1) + 1 if len(depth) else (0, 0)
+    for across in range(int(sides[0])):
+        for down in range(int(sides[1])):
+            x, y = low[0] + across, low[1] + down
+            inside = (x <= high[0]) & (y <= high[1]) & (x >= 0) & (y >= 0) & (x < lens.width) & (y < lens.height) & (depth > NEAREST)
+            np.minimum.at(nearest.reshape(-1), y[inside] * lens.width + x[inside], depth[inside])
     return np.where(np.isfinite(nearest), nearest, np.nan).astype(np.float32)
 
 
-def _seen(pixels, z, depth_lens, colour_lens, matrix):
-    """Pixels (n, 2) and depth (n,) in the colour of pixels of the depth; what is behind the camera stands at no pixel."""
-    points = np.concatenate([depth_lens.directions(pixels), np.ones((len(z), 1))], axis=1) * z[:, None]
-    points = points @ matrix[:3, :3].T + matrix[:3, 3]
-    before = points[:, 2] > NEAREST
-    seen = np.full((len(z), 2), -1e6)
-    seen[before] = np.clip(colour_lens.project(points[before]), -1e6, 1e6)
-    return seen, points[:, 2]
+def _rays(lens, height, width, first):
+    """(height, width, 3) with z = 1 of pixels from `first` on."""
+    y, x = np.indices((height, width)) + first
+    plain = lens.directions(np.stack([x.ravel(), y.ravel()], axis=1))
+    return np.concatenate([plain, np.ones((len(plain), 1))], axis=1).reshape(height, width, 3)
 
 
 def _checked(path, source, matrix):

@@ -28,7 +28,7 @@ class Camera:
     depth: choice.PictureTopic | None
     lens: Lens | None              # of the colour where there is one; None where a file of one's own has it
     depth_lens: Lens | None        # of the depth as it is recorded
-    align: np.ndarray | None       # T_colour_depth (4, 4) of depth that is on other pixels
+    align: alignment.Reprojection | None  # of depth that is on other pixels
     scale: float                   # [m] a count of the depth
     stamps: dict                   # of each topic its Stamps
     info_stamps: dict              # of each topic those of its camera_info
@@ -50,7 +50,9 @@ def open_camera(recording, colour, depth, tree, scale=None, own_lens=False):
         raise refusal(recording.path, depth.name, f"found depth in the frame {depth.frame} beside {colour.name} in {colour.frame} and one "
                                                   "--camera-info, expected aligned depth; --topics takes one of them alone")
     if colour and depth and not own_lens:
-        align = alignment.colour_from_depth(recording, colour, depth, lenses[colour.name], lenses[depth.name], tree)
+        pair = lenses[colour.name], lenses[depth.name]
+        matrix = alignment.colour_from_depth(recording, colour, depth, *pair, tree)
+        align = None if matrix is None else alignment.Reprojection(*pair[::-1], matrix)
     if depth and scale is None:
         scale, _ = depth_scale(recording, depth.name)
     stamps = _stamps(recording, [picture for picture in (colour, depth) if picture])
@@ -96,7 +98,7 @@ def depth_file(camera, depth):
     metres = depth.pixels * camera.scale if depth.counts else depth.pixels
     metres = np.where(np.isfinite(metres) & (metres > 0), metres, np.nan)
     if camera.align is not None:
-        metres = alignment.reprojected(np.nan_to_num(metres), camera.depth_lens, camera.lens, camera.align)
+        metres = camera.align(np.nan_to_num(metres))
     file = io.BytesIO()
     np.save(file, metres.astype(np.float32))
     return "npy", file.getvalue()

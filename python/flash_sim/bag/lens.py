@@ -29,20 +29,23 @@ class Lens:
         """As messages say it."""
         return f"{self.width} x {self.height}"
 
-    def project(self, points):
-        """Pixels (n, 2) of points (n, 3) before the camera, by OpenCV's formula."""
-        return self._pixels(points[:, :2] / points[:, 2:])
+    def seen(self, x, y):
+        """Pixels (2, n) of directions x / z and y / z, each (n,), by OpenCV's formula."""
+        if any(self.distortion):
+            radial, across, down = self._distortion(x, y)
+            x, y = x * radial + across, y * radial + down
+        return np.stack([self.fx * x + self.cx, self.fy * y + self.cy])
 
     def directions(self, pixels):
         """x / z and y / z (n, 2) of pixels (n, 2); distortion is inverted by iteration, exact to 1e-9 for usual lenses."""
         plain = (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
         if not any(self.distortion):
             return plain
-        found = plain.copy()
+        x, y = plain.T
         for _ in range(30):
-            radial, tangential = self._distortion(found)
-            found = (plain - tangential) / radial[:, None]
-        return found
+            radial, across, down = self._distortion(x, y)
+            x, y = (plain[:, 0] - across) / radial, (plain[:, 1] - down) / radial
+        return np.stack([x, y], axis=1)
 
     def text(self, name="camera"):
         """Of a ROS camera_info YAML file."""
@@ -55,16 +58,12 @@ class Lens:
                 + matrix("rectification_matrix", 3, 3, np.eye(3).ravel())
                 + matrix("projection_matrix", 3, 4, [*k[:3], 0, *k[3:6], 0, *k[6:], 0]))
 
-    def _pixels(self, plain):
-        radial, tangential = self._distortion(plain)
-        return (plain * radial[:, None] + tangential) * [self.fx, self.fy] + [self.cx, self.cy]
-
-    def _distortion(self, plain):
+    def _distortion(self, x, y):
+        """The radial factor, and what is added to x and to y."""
         k1, k2, p1, p2, k3, k4, k5, k6 = (*self.distortion, 0, 0, 0)[:8]
-        x, y = plain.T
         r2 = x * x + y * y
         radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-        return radial, np.stack([2 * p1 * x * y + p2 * (r2 + 2 * x * x), p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], axis=1)
+        return radial, 2 * p1 * x * y + p2 * (r2 + 2 * x * x), p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
 
 
 def lens_of(message, where, rectified=False):
