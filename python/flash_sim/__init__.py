@@ -8,8 +8,8 @@ import importlib
 _MODULES = {"State": "_core", "__version__": "_core", "Asset": "asset", "look_at": "cameras", "DeviceArray": "device_array",
             "to_host": "device_array", "DepthNoise": "depth_noise", "add_depth_noise": "depth_noise",
             "jitter_poses": "depth_noise", "RealtimeSim": "realtime_sim"}
-__all__ = ["Asset", "DepthNoise", "DeviceArray", "RealtimeSim", "State", "__version__", "add_depth_noise", "jitter_poses", "look_at",
-           "to_host"]
+__all__ = ["Asset", "DepthNoise", "DeviceArray", "RealtimeSim", "State", "__version__", "add_depth_noise", "jitter_poses",
+           "look_at", "to_host"]
 
 
 def __getattr__(name):

@@ -37,8 +37,8 @@ class Cell:
         """An Image of pixels (h, w) or (h, w, c); rows end with `pad` bytes of nothing."""
         rows = np.ascontiguousarray(pixels).view(np.uint8).reshape(len(pixels), -1)
         data = np.pad(rows, ((0, 0), (0, pad)), constant_values=7)
-        self.add(topic, "sensor_msgs/msg/Image", stamp, late, frame, height=pixels.shape[0], width=pixels.shape[1], encoding=encoding,
-                 step=data.shape[1], data=data.ravel())
+        self.add(topic, "sensor_msgs/msg/Image", stamp, late, frame, height=pixels.shape[0], width=pixels.shape[1],
+                 encoding=encoding, step=data.shape[1], data=data.ravel())
 
     def compressed(self, topic, stamp, data, form, frame="camera_optical"):
         self.add(topic, "sensor_msgs/msg/CompressedImage", stamp, LATE, frame, format=form, data=np.frombuffer(data, np.uint8))

@@ -98,8 +98,8 @@ def program(name):
 
 def calibrated(folder, out):
     """T_gripper_camera, as translation and quaternion, by flash-calib."""
-    done = subprocess.run([program("flash-calib"), "handeye", folder, "--setup", "eye-in-hand", "--target", BOARD, "--quiet", "-o", out],
-                          capture_output=True, text=True, check=False)
+    words = [program("flash-calib"), "handeye", folder, "--setup", "eye-in-hand", "--target", BOARD, "--quiet", "-o", out]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     transform = json.loads(out.read_text())["transform"]
     return np.array([*transform["translation"], *transform["rotation_xyzw"]])
@@ -165,12 +165,18 @@ def test_pictures_show_each_stop_once_with_its_pose(tmp_path, wrist, stops, draw
         assert np.abs(rows[k, 1:4] - stops[stop][:3, 3]).max() < 1e-9
 
 
+def logged_later(cell, late):
+    """The same messages; those of /tf arrive `late` [ns] later."""
+    other = Cell()
+    other.entries = [(topic, kind, time + late * (topic == "/tf"), fields) for topic, kind, time, fields in cell.entries]
+    return other
+
+
 def test_log_times_change_nothing(tmp_path, wrist):
     """Neither another delay nor another order of the log."""
     folders = []
     for name, late in (("a", 0), ("b", -3 * SECOND)):
-        other = Cell()
-        other.entries = [(topic, kind, time + (late if topic == "/tf" else 0), fields) for topic, kind, time, fields in wrist.entries]
+        other = logged_later(wrist, late)
         (tmp_path / name).mkdir()
         assert main([str(other.write(tmp_path / name, "db3")), "-o", str(tmp_path / name / "set"), "--quiet"]) == 0
         folders.append(contents(tmp_path / name / "set"))
@@ -179,8 +185,7 @@ def test_log_times_change_nothing(tmp_path, wrist):
 
 def test_clocks_that_arrive_apart_are_warned_of(tmp_path, wrist, capsys):
     """By a second: no stamp by itself tells."""
-    other = Cell()
-    other.entries = [(topic, kind, time + (SECOND if topic == "/tf" else 0), fields) for topic, kind, time, fields in wrist.entries]
+    other = logged_later(wrist, SECOND)
     assert main([str(other.write(tmp_path, "mcap")), "-o", str(tmp_path / "set"), "--quiet"]) == 0
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and f"warning: stamps of {PICTURES} lie -1.000 s farther" in error and "/tf" in error

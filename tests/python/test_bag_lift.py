@@ -29,8 +29,8 @@ def lift(tmp_path_factory):
     """What `synth --raw` writes, with the times of a unix clock; the folder and the recording of it."""
     from PIL import Image
     folder = tmp_path_factory.mktemp("lift") / "recording"
-    run("flash-sysid", "synth", "--asset", ROOT / "examples/assets/towel.json", "--mesh", "sheet:0.2x0.2:0.05", "--raw", "--resolution",
-        "160x120", "--duration", "1", "--quiet", "-o", folder)
+    run("flash-sysid", "synth", "--asset", ROOT / "examples/assets/towel.json", "--mesh", "sheet:0.2x0.2:0.05", "--raw",
+        "--resolution", "160x120", "--duration", "1", "--quiet", "-o", folder)
     view = folder / "camera1"
     extrinsics = json.loads((view / "extrinsics.json").read_text())["transform"]
     place, (x, y, z, w) = extrinsics["translation"], extrinsics["rotation_xyzw"]
@@ -50,12 +50,14 @@ def lift(tmp_path_factory):
         cell.info(INFO, START + 100 * k * MS, lens)
     times = [START / 1e9 + 0.1 * k for k in range(k + 1)]
     (folder / "times.csv").write_text("t\n" + "".join(f"{time:.9f}\n" for time in times))
-    (folder / "gripper.tum").write_text("".join(" ".join(map(repr, [START / 1e9 + t, *values])) + "\n" for t, *values in rows.tolist()))
+    lines = [" ".join(map(repr, [START / 1e9 + t, *values])) for t, *values in rows.tolist()]
+    (folder / "gripper.tum").write_text("\n".join(lines) + "\n")
     return folder, cell
 
 
 def segmented(folder, out):
-    run("flash-sysid", "segment", folder / "camera1", "--trajectory", folder / "gripper.tum", "--times", folder / "times.csv", "-o", out)
+    run("flash-sysid", "segment", folder / "camera1", "--trajectory", folder / "gripper.tum", "--times", folder / "times.csv",
+        "-o", out)
     return contents(out / "frames")
 
 
@@ -82,7 +84,8 @@ def test_the_command_that_comes_next_is_one_that_works(tmp_path, lift, capsys, m
     monkeypatch.chdir(tmp_path)
     assert main([str(source), "-o", "my lift", "--for", "segment"]) == 0
     command = capsys.readouterr().out.splitlines()[-1].removeprefix("next: ")
-    done = subprocess.run(command.replace("flash-sysid", str(program("flash-sysid")), 1), shell=True, capture_output=True, text=True, check=False)
+    command = command.replace("flash-sysid", str(program("flash-sysid")), 1)
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "segmented/segment.svg").exists()
 
@@ -104,7 +107,8 @@ def cloud(points, step=20):
     for offset, values in ((0, points[:, 1]), (8, points[:, 2]), (12, points[:, 0])):
         data[:, offset:offset + 4] = values.astype("<f4")[:, None].view(np.uint8)
     fields = [{"name": name, "offset": offset, "datatype": 7, "count": 1} for name, offset in (("x", 12), ("y", 0), ("z", 8))]
-    return {"height": 1, "width": len(points), "fields": fields, "point_step": step, "row_step": step * len(points), "data": data.ravel()}
+    return {"height": 1, "width": len(points), "fields": fields, "point_step": step, "row_step": step * len(points),
+            "data": data.ravel()}
 
 
 def test_clouds(tmp_path, lift, capsys):
@@ -115,7 +119,8 @@ def test_clouds(tmp_path, lift, capsys):
     other = Cell()
     other.entries = [entry for entry in cell.entries if "tf" in entry[0]]
     for k in range(4):
-        other.add("/camera/points", "sensor_msgs/msg/PointCloud2", START + 100 * k * MS, frame="camera_optical", **cloud(points + k))
+        other.add("/camera/points", "sensor_msgs/msg/PointCloud2", START + 100 * k * MS, frame="camera_optical",
+                  **cloud(points + k))
     out = tmp_path / "out"
     assert main([str(other.write(tmp_path, "db3")), "-o", str(out), "--for", "segment", "--quiet"]) == 0
     found = (out / "camera1/000002.ply").read_bytes()

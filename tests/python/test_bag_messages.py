@@ -7,7 +7,8 @@ import bag_fixtures as fixtures
 import numpy as np
 import pytest
 from bag_fixtures import LATE, START, Cell, pose, rotation
-from test_bag_refusals import COLOUR, COLOUR_INFO, COUNTS, DEPTH, DEPTH_INFO, HEIGHT, LENS, MS, PIXELS, STOPS, WIDTH, add_depth, left, picture_times, small
+from test_bag_refusals import (COLOUR, COLOUR_INFO, COUNTS, DEPTH, DEPTH_INFO, HEIGHT, LENS, MS, PIXELS, STOPS, WIDTH, add_depth,
+                               left, picture_times, small)
 
 from flash_sim.bag import alignment, orbbec_sdk, pictures, rigid
 from flash_sim.bag.__main__ import main
@@ -20,7 +21,8 @@ pytest.importorskip("PIL", reason="Pillow is not installed, which reads compress
 
 ARM = """<robot name="arm"><link name="base"/>
 <joint name="lift" type="prismatic"><parent link="base"/><child link="a"/><origin xyz="0 0 0.1"/><axis xyz="0 0 2"/></joint>
-<joint name="shoulder" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.1 0 0.2" rpy="0.1 -0.2 0.3"/><axis xyz="0 1 0"/></joint>
+<joint name="shoulder" type="revolute"><parent link="a"/><child link="b"/>
+<origin xyz="0.1 0 0.2" rpy="0.1 -0.2 0.3"/><axis xyz="0 1 0"/></joint>
 <joint name="plate" type="fixed"><parent link="b"/><child link="c"/><origin xyz="0 0.05 0" rpy="1.5707963267948966 0 0"/></joint>
 <joint name="wrist" type="continuous"><parent link="c"/><child link="tool0"/><origin xyz="0 0 0.3"/><axis xyz="1 0 1"/></joint>
 <joint name="finger" type="prismatic"><parent link="tool0"/><child link="left"/></joint>
@@ -79,7 +81,8 @@ def test_joints_with_the_description_of_the_robot(tmp_path):
 def test_kinematics_from_one_link_to_another():
     model = robot_model(ARM, "arm.urdf", "a", "c")
     assert model.moving == ["shoulder"]
-    middle = pose([0.1, 0, 0.2], rotation([0, 0, 1], 0.3) @ rotation([0, 1, 0], -0.2) @ rotation([1, 0, 0], 0.1) @ rotation([0, 1, 0], 0.4))
+    turn = rotation([0, 0, 1], 0.3) @ rotation([0, 1, 0], -0.2) @ rotation([1, 0, 0], 0.1) @ rotation([0, 1, 0], 0.4)
+    middle = pose([0.1, 0, 0.2], turn)
     assert np.abs(model.pose([0.4]) - middle @ pose([0, 0.05, 0], rotation([1, 0, 0], np.pi / 2))).max() < 1e-12
 
 
@@ -110,12 +113,13 @@ def test_one_pose_a_picture_and_poses_from_a_file(tmp_path):
     for k, stop in enumerate(STOPS):
         stamp = START + k * 2000 * MS
         cell.image(COLOUR, stamp, PIXELS, "rgb8")
-        lines.append(" ".join([f"{stamp // 10**9}.{stamp % 10**9:09d}", *map(repr, map(float, [*stop[:3, 3], *fixtures.quaternion(stop[:3, :3])]))]))
+        values = map(float, [*stop[:3, 3], *fixtures.quaternion(stop[:3, :3])])
+        lines.append(" ".join([f"{stamp // 10**9}.{stamp % 10**9:09d}", *map(repr, values)]))
     (tmp_path / "arm.tum").write_text("# t x y z qx qy qz qw\n" + "\n".join(lines) + "\n")
     expect_poses(converted(tmp_path, cell, "--poses", str(tmp_path / "arm.tum")), STOPS)
     folder = converted(tmp_path, cell, "--without-poses", "--setup", "eye-in-hand", "--target", "chessboard:9x6:0.025")
-    assert left(folder) == ["camera_info.yaml", "images", *(f"images/{START // 10**9 + 2 * k}.299000000.png" for k in range(5)), "pairs.csv",
-                            "target.json"]
+    names = [f"images/{START // 10**9 + 2 * k}.299000000.png" for k in range(5)]
+    assert left(folder) == ["camera_info.yaml", "images", *names, "pairs.csv", "target.json"]
 
 
 def test_interpolation_is_by_slerp():
@@ -148,7 +152,8 @@ def test_encodings(tmp_path, encoding, pixels, shown):
     assert (np.asarray(Image.open(converted(tmp_path, cell) / "images/000003.png")) == shown).all()
 
 
-@pytest.mark.parametrize("encoding, first", [("bayer_rggb8", (0, 0)), ("bayer_grbg8", (0, 1)), ("bayer_gbrg8", (1, 0)), ("bayer_bggr8", (1, 1))])
+@pytest.mark.parametrize("encoding, first", [("bayer_rggb8", (0, 0)), ("bayer_grbg8", (0, 1)), ("bayer_gbrg8", (1, 0)),
+                                             ("bayer_bggr8", (1, 1))])
 def test_bayer(encoding, first):
     """Planes of one slope come back exactly away from the edge, whatever pixel is red."""
     y, x = np.indices((12, 16))
@@ -237,8 +242,8 @@ def sdk(cell, units=None, name="Intel RealSense D435", turn=np.eye(3), depth_len
                                                 (None, "Intel RealSense L515", 0.00025), (None, "Intel RealSense D435", 0.001)])
 def test_metres_a_count_of_realsense(tmp_path, units, name, scale):
     """librealsense#8058: .00025 m of an L515. There are no poses in such files."""
-    folder = converted(tmp_path, sdk(Cell(), units, name), "--without-poses", "--topics", "/device_0/sensor_0/Depth_0/image/data", "--for",
-                       "segment")
+    folder = converted(tmp_path, sdk(Cell(), units, name), "--without-poses", "--topics", "/device_0/sensor_0/Depth_0/image/data",
+                       "--for", "segment")
     found = depth_of(folder / "camera1")
     metres = found * 0.001 if found.dtype == np.uint16 else found
     assert np.abs(metres - COUNTS * scale).max() < 1e-7
@@ -277,12 +282,14 @@ def test_reprojection_against_rays(tmp_path):
     assert np.abs(middle - expected[8:-8, 8:-8]).max() < 0.6 * (0.2 + 0.1) * expected.max() ** 2 / offset / 70
 
 
-@pytest.mark.parametrize("kind, columns", [("realsense2_camera_msgs/msg/Extrinsics", True), ("orbbec_camera_msgs/msg/Extrinsics", False)])
+@pytest.mark.parametrize("kind, columns", [("realsense2_camera_msgs/msg/Extrinsics", True),
+                                           ("orbbec_camera_msgs/msg/Extrinsics", False)])
 def test_extrinsics_of_drivers(tmp_path, kind, columns):
     """RealSense writes rotations column by column, Orbbec row by row; a wall that is turned tells."""
     turn = rotation([0, 1, 0], 0.06)
     cell = add_depth(small(), frame="depth_optical", pixels=np.full((HEIGHT, WIDTH), 1000, np.uint16))
-    cell.add("/camera/extrinsics/depth_to_color", kind, START, rotation=(turn.T if columns else turn).ravel(), translation=[0, 0, 0])
+    cell.add("/camera/extrinsics/depth_to_color", kind, START, translation=[0, 0, 0],
+             rotation=(turn.T if columns else turn).ravel())
     expect_turned_wall(depth_of(converted(tmp_path, cell)), turn)
 
 
@@ -335,7 +342,8 @@ def orbbec_frame(stamp, encoding, data, metadata=b"", step=2 * WIDTH, newer=True
     head = struct.pack("<III", 0, stamp // 10**9, stamp % 10**9) + struct.pack("<I", 0) + struct.pack("<II", HEIGHT, WIDTH)
     head += struct.pack("<I", len(encoding)) + encoding.encode() + struct.pack("<BI", 0, step)
     if newer:
-        return head + struct.pack("<II", len(metadata), len(metadata) + len(data)) + metadata + data + struct.pack("<4Q", 1, 2, 3, 4)
+        head += struct.pack("<II", len(metadata), len(metadata) + len(data))
+        return head + metadata + data + struct.pack("<4Q", 1, 2, 3, 4)
     return head + struct.pack("<I", len(data)) + data
 
 
@@ -354,16 +362,17 @@ def test_a_recording_of_orbbecs_own(tmp_path):
     turn = rotation([0, 1, 0], 0.06)
 
     def profile(matrix, lens):
-        return (struct.pack("<IIII", 0, 0, 0, 0) + b"\x03\x01" + struct.pack("<9f", *matrix.ravel()) + struct.pack("<3f", 0, 0, 0)
-                + struct.pack("<3H", WIDTH, HEIGHT, 30) + struct.pack("<4f", lens.fx, lens.fy, lens.cx, lens.cy) + struct.pack("<8f", *[0] * 8)
-                + b"\x04")
+        numbers = struct.pack("<12f3H12f", *matrix.ravel(), 0, 0, 0, WIDTH, HEIGHT, 30, lens.fx, lens.fy, lens.cx, lens.cy, *[0] * 8)
+        return struct.pack("<IIII", 0, 0, 0, 0) + b"\x03\x01" + numbers + b"\x04"
     file = io.BytesIO()
     Image.fromarray(PIXELS).save(file, "JPEG")
     path = tmp_path / "orbbec.bag"
     with Writer(path) as writer:
-        topics = {name: writer.add_connection(name, kind, msgdef="uint8[] data\n", md5sum=32 * "0") for name, kind in (
-            ("/cam/sensor_2/frameType_2", "sensor_msgs/msg/Image"), ("/cam/sensor_3/frameType_3", "sensor_msgs/msg/Image"),
-            ("/cam/streamProfileType_2", "custom_msg/msg/OBStreamProfileInfo"), ("/cam/streamProfileType_3", "custom_msg/msg/OBStreamProfileInfo"))}
+        kinds = {"sensor_2/frameType_2": "sensor_msgs/msg/Image", "sensor_3/frameType_3": "sensor_msgs/msg/Image",
+                 "streamProfileType_2": "custom_msg/msg/OBStreamProfileInfo",
+                 "streamProfileType_3": "custom_msg/msg/OBStreamProfileInfo"}
+        topics = {f"/cam/{name}": writer.add_connection(f"/cam/{name}", kind, msgdef="uint8[] data\n", md5sum=32 * "0")
+                  for name, kind in kinds.items()}
         writer.write(topics["/cam/streamProfileType_2"], START, profile(np.zeros((3, 3)), LENS))
         writer.write(topics["/cam/streamProfileType_3"], START, profile(turn, fixtures.lens(WIDTH, HEIGHT, 13.0)))
         for stamp in picture_times()[:5]:

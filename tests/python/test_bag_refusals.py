@@ -102,8 +102,8 @@ def test_a_bag_without_an_index_names_reindex(tmp_path, capsys):
     assert f"rosbag reindex {path}" in refused(capsys, tmp_path, path)
 
 
-@pytest.mark.parametrize("name, content", [("a.bag", b""), ("a.bag", b"no bag at all\n"), ("a.mcap", b"\x89MCAP0\r\n"), ("a.mcap", b""),
-                                           ("a.db3", b"SQLite format 3\0"), ("a.db3", b""), ("a.txt", b"x")])
+@pytest.mark.parametrize("name, content", [("a.bag", b""), ("a.bag", b"no bag at all\n"), ("a.mcap", b"\x89MCAP0\r\n"),
+                                           ("a.mcap", b""), ("a.db3", b"SQLite format 3\0"), ("a.db3", b""), ("a.txt", b"x")])
 def test_files_that_are_no_recordings(tmp_path, capsys, name, content):
     (tmp_path / name).write_bytes(content)
     assert name in refused(capsys, tmp_path, tmp_path / name)

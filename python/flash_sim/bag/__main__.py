@@ -53,8 +53,9 @@ class Parser(argparse.ArgumentParser):
 
 def parser():
     """The command line."""
-    p = Parser(prog=f"python -m {NAME}", description="Turns a recording (ROS 1 .bag, rosbag2 folder, .db3, .mcap; of ROS, RealSense or "
-               "Orbbec) into a folder that flash-calib handeye or flash-sysid segment reads. Needs no ROS.",
+    p = Parser(prog=f"python -m {NAME}",
+               description="Turns a recording (ROS 1 .bag, rosbag2 folder, .db3, .mcap; of ROS, RealSense or Orbbec) into a folder "
+               "that flash-calib handeye or flash-sysid segment reads. Needs no ROS.",
                epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
     p.add_argument("recording", metavar="IN", help="file or folder of a recording; without -o its topics are listed")
     p.add_argument("-o", "--out", metavar="FOLDER", help="folder to write")
@@ -68,11 +69,14 @@ def parser():
     p.add_argument("--without-poses", action="store_true", help="write no poses")
     p.add_argument("--camera-info", metavar="FILE", default="", help="the lens, instead of that of the recording")
     p.add_argument("--extrinsics", metavar="FILE", default="", help="where the camera is on the base, copied for segment")
-    p.add_argument("--depth-scale", metavar="METRES", type=number(1e-7, 1), help="metres per count of depth, instead of the recording's")
-    p.add_argument("--views", metavar="N", type=int, default=0, help="at most N views of handeye, of those where the robot stands still")
+    p.add_argument("--depth-scale", metavar="METRES", type=number(1e-7, 1),
+                   help="metres per count of depth, instead of the recording's")
+    p.add_argument("--views", metavar="N", type=int, default=0,
+                   help="at most N views of handeye, of those where the robot stands still")
     p.add_argument("--every", metavar="SECONDS", type=number(0, 3600),
-                   help="take pictures of a moving arm at least this far apart, with the poses over time, for handeye --time-offset")
-    p.add_argument("--from", dest="start", metavar="SECONDS", type=number(0, 1e9), help="leave out what is before, since the first picture")
+                   help="take pictures of a moving arm at least this far apart, with the poses over time, for --time-offset")
+    p.add_argument("--from", dest="start", metavar="SECONDS", type=number(0, 1e9),
+                   help="leave out what is before, since the first picture")
     p.add_argument("--until", dest="end", metavar="SECONDS", type=number(0, 1e9), help="leave out what is after")
     p.add_argument("--setup", choices=("eye-in-hand", "eye-to-hand"), default="", help="written to target.json")
     p.add_argument("--target", metavar="TEXT", default="", help="the target, as chessboard:9x6:0.025, written to target.json")

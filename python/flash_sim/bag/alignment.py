@@ -26,7 +26,8 @@ def colour_from_depth(recording, colour, depth, colour_lens, depth_lens, tree):
         way = tree.path_of(colour.frame, depth.frame)
         if way is not None and not any(child in tree.moving_frames for child, _ in way):
             return _checked(recording.path, "/tf_static", tree.chain(colour.frame, depth.frame).at(0)[0])
-    raise refusal(recording.path, depth.name, f"found depth {depth_lens.size} px in the frame {depth.frame}, which is not aligned to "
+    raise refusal(recording.path, depth.name,
+                  f"found depth {depth_lens.size} px in the frame {depth.frame}, which is not aligned to "
                   f"{colour.name}, {colour_lens.size} px in {colour.frame}, and no extrinsics of the two, expected "
                   "/tf_static or aligned depth; --topics takes one of them alone")
 
@@ -45,7 +46,8 @@ class Reprojection:
         self._forward = _rays(depth_lens, depth_lens.height, depth_lens.width, 0) @ turn[:, 2]
 
     def __call__(self, metres):
-        """Depth of the colour camera (h, w) float32 [m], not a number where none falls. metres: (h, w), 0 where nothing was measured."""
+        """Depth of the colour camera (h, w) float32 [m], not a number where none falls, of metres (h, w), 0 where nothing was
+        measured."""
         height, width = metres.shape
         seen = metres > NEAREST
         z = metres[seen].astype(np.float64)
@@ -79,7 +81,8 @@ def _nearest(lens, least, most, depth):
     for across in range(int(sides[0])):
         for down in range(int(sides[1])):
             x, y = low[0] + across, low[1] + down
-            inside = (x <= high[0]) & (y <= high[1]) & (x >= 0) & (y >= 0) & (x < lens.width) & (y < lens.height) & (depth > NEAREST)
+            inside = (x <= high[0]) & (y <= high[1]) & (x >= 0) & (y >= 0) & (x < lens.width) & (y < lens.height)
+            inside &= depth > NEAREST
             np.minimum.at(nearest.reshape(-1), y[inside] * lens.width + x[inside], depth[inside])
     return np.where(np.isfinite(nearest), nearest, np.nan).astype(np.float32)
 
@@ -96,8 +99,9 @@ def _checked(path, source, matrix):
     rotation = rigid.expect_rotation(matrix[:3, :3], path, source)
     place = matrix[:3, 3]
     if not np.linalg.norm(place) < FARTHEST:
-        raise refusal(path, source, f"found the cameras {np.linalg.norm(place):.4g} m apart, expected less than {FARTHEST:g} m: are "
-                                    "these millimetres?")
+        raise refusal(path, source,
+                      f"found the cameras {np.linalg.norm(place):.4g} m apart, expected less than {FARTHEST:g} m: are "
+                      "these millimetres?")
     return rigid.transform(rotation, place)
 
 

@@ -1,5 +1,4 @@
-"""How long after its stamp a message arrived. Nothing is timed by it: it tells stamps of two clocks apart, as no stamp by itself can.
-"""
+"""How long after its stamp a message arrived. Nothing is timed by it: it tells stamps of two clocks apart, as no stamp can."""
 import itertools
 
 import numpy as np
@@ -23,5 +22,5 @@ def doubt(delay, other, name, other_name):
     """What to know where messages arrive so far apart; empty where they do not."""
     if abs(delay - other) <= LARGEST_DELAY:
         return ""
-    return (f"stamps of {name} lie {(delay - other) * 1e-9:+.3f} s farther before their arrival than those of {other_name}: do their clocks "
-            "differ? Synchronise them, or let flash-calib handeye --time-offset tell")
+    return (f"stamps of {name} lie {(delay - other) * 1e-9:+.3f} s farther before their arrival than those of {other_name}: "
+            "do their clocks differ? Synchronise them, or let flash-calib handeye --time-offset tell")

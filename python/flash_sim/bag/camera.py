@@ -44,11 +44,13 @@ def open_camera(recording, colour, depth, tree, scale=None, own_lens=False):
     file has the lens. Throws RecordingError."""
     lenses, info_stamps = {}, {}
     for picture in filter(None, (colour, depth)):
-        lenses[picture.name], info_stamps[picture.name] = (None, Stamps(np.empty(0, np.int64), 0)) if own_lens else _lens(recording, picture)
+        found = (None, Stamps(np.empty(0, np.int64), 0)) if own_lens else _lens(recording, picture)
+        lenses[picture.name], info_stamps[picture.name] = found
     align = None
     if colour and depth and own_lens and not (depth.aligned or depth.frame == colour.frame):
-        raise refusal(recording.path, depth.name, f"found depth in the frame {depth.frame} beside {colour.name} in {colour.frame} and one "
-                                                  "--camera-info, expected aligned depth; --topics takes one of them alone")
+        raise refusal(recording.path, depth.name,
+                      f"found depth in the frame {depth.frame} beside {colour.name} in {colour.frame} and one "
+                      "--camera-info, expected aligned depth; --topics takes one of them alone")
     if colour and depth and not own_lens:
         pair = lenses[colour.name], lenses[depth.name]
         matrix = alignment.colour_from_depth(recording, colour, depth, *pair, tree)
@@ -134,8 +136,9 @@ def compare_infos(path, camera, said):
 def _paired(path, stamps, others, name, other, said):
     streams.expect_one_clock(path, name, stamps.times, other, others.times)
     if abs(stamps.delay - others.delay) > LARGEST_DELAY:
-        raise refusal(path, f"{name} and {other}", f"found stamps that are {(stamps.delay - others.delay) * 1e-9:+.3f} s apart for what "
-                                                   "arrived together, expected one clock: what was seen at one time is not known")
+        apart = (stamps.delay - others.delay) * 1e-9
+        raise refusal(path, f"{name} and {other}", f"found stamps that are {apart:+.3f} s apart for what arrived together, expected one "
+                                                   "clock: what was seen at one time is not known")
     pairs = streams.paired(stamps.times, others.times)
     said(pairs.text(name, other))
     if pairs.belong.mean() < 0.5:
@@ -153,8 +156,9 @@ def _lens(recording, picture):
     for _, time, message in recording.logged_messages([topic]):
         found = lens_of(message, where, picture.rectified)
         if lens not in (None, found):
-            raise refusal(where, f"found two lenses (fx {lens.fx:.6g} and {found.fx:.6g}, {lens.size} and {found.size} px), expected one "
-                                 "all the time")
+            raise refusal(where,
+                          f"found two lenses (fx {lens.fx:.6g} and {found.fx:.6g}, {lens.size} and {found.size} px), expected one "
+                          "all the time")
         lens = found
         stamps.append(stamp_of(message))
         delays.append(time - stamps[-1])
@@ -167,15 +171,18 @@ def _stamps(recording, wanted):
     frames = {picture.name: picture.frame for picture in wanted}
     for topic, time, message in recording.logged_messages(found):
         if frame_of(message) != frames[topic]:
-            raise refusal(recording.path, topic, f"found pictures in the frames {frames[topic]} and {frame_of(message)}, expected one")
+            raise refusal(recording.path, topic,
+                          f"found pictures in the frames {frames[topic]} and {frame_of(message)}, expected one")
         found[topic].append(stamp_of(message))
         delays[topic].append(time - found[topic][-1])
     for topic, stamps in found.items():
         if not any(stamps):
-            raise refusal(recording.path, topic, "found the stamp 0 in every header, expected the time at which a picture was taken")
+            raise refusal(recording.path, topic,
+                          "found the stamp 0 in every header, expected the time at which a picture was taken")
         if len(set(stamps)) < len(stamps):
-            raise refusal(recording.path, topic, f"found {len(stamps) - len(set(stamps))} pictures with the stamp of another, expected "
-                                                 "one a stamp: was the bag recorded while it was played, or twice?")
+            raise refusal(recording.path, topic,
+                          f"found {len(stamps) - len(set(stamps))} pictures with the stamp of another, expected "
+                          "one a stamp: was the bag recorded while it was played, or twice?")
     return {topic: Stamps(np.sort(np.asarray(stamps, np.int64)), int(np.median(delays[topic]))) for topic, stamps in found.items()}
 
 

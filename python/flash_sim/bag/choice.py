@@ -49,13 +49,16 @@ def survey(recording):
     for topic in recording.topics.values():
         if topic.count and (topic.kind in PICTURE_KINDS or orbbec_sdk.FRAMES.fullmatch(topic.name)):
             message = recording.first(topic.name)
-            found.append(PictureTopic(topic.name, topic.count, is_depth(message, topic.name), encoding_of(message), frame_of(message)))
+            depth = is_depth(message, topic.name)
+            found.append(PictureTopic(topic.name, topic.count, depth, encoding_of(message), frame_of(message)))
     return found
 
 
 def choose_pictures(path, pictures, wanted=()):
-    """(colour, depth) of PictureTopics, each None where there is none; if `wanted` names some, of these alone. Of several a raw topic
-    comes before its compressed twin, colour before grey, aligned depth before the other. Throws RecordingError where two are left.
+    """(colour, depth) of PictureTopics, each None where there is none; if `wanted` names some, of these alone.
+
+    Of several a raw topic comes before its compressed twin, colour before grey, aligned depth before the other. Throws
+    RecordingError where two are left.
     """
     named = [picture for picture in pictures if picture.name in wanted]
     candidates = named or pictures
@@ -94,8 +97,9 @@ def info_topic(recording, picture):
     alike = [name for name in infos if frame_of(recording.first(name)) == picture.frame]
     if len(alike) == 1:
         return alike[0]
-    raise refusal(recording.path, picture.name, f"found no camera_info of it{' but ' + ', '.join(infos) if infos else ''}, expected "
-                                                f"{parent}/camera_info: record it, or name a file by --camera-info")
+    raise refusal(recording.path, picture.name,
+                  f"found no camera_info of it{' but ' + ', '.join(infos) if infos else ''}, expected "
+                  f"{parent}/camera_info: record it, or name a file by --camera-info")
 
 
 def _preferred(pictures, better):

@@ -25,7 +25,8 @@ def write_hand_eye(recording, camera, stream, folder, settings, said):
     """Writes the data set into a StagedFolder; how many pictures. stream: of T_base_tool, None: poses are left out. settings: those
     of the command line. Throws RecordingError."""
     if camera.colour is None:
-        raise refusal(recording.path, "found no pictures (sensor_msgs/Image or CompressedImage of eight bits), expected those of a target")
+        raise refusal(recording.path,
+                      "found no pictures (sensor_msgs/Image or CompressedImage of eight bits), expected those of a target")
     pairs = cameras.paired_depth(recording.path, camera, said)
     name = camera.colour.name
     stamps = camera.stamps[name].times
@@ -69,8 +70,9 @@ def _of_stops(path, stream, stamps, poses, settings, said):
     """Indices of one picture of each stop, at most `views` of them, evenly."""
     found = stops(stream, stamps, poses)
     if len(found) < FEWEST_STOPS:
-        raise refusal(path, f"found {len(found)} places at which the robot of {stream.source} stands still for 0.4 s while a picture is "
-                            f"taken, expected at least {FEWEST_STOPS}; --every 0.5 takes pictures of a moving arm")
+        raise refusal(path,
+                      f"found {len(found)} places at which the robot of {stream.source} stands still for 0.4 s while a picture is "
+                      f"taken, expected at least {FEWEST_STOPS}; --every 0.5 takes pictures of a moving arm")
     chosen = [stop[len(stop) // 2] for stop in found]
     said(f"the robot stands still at {len(found)} places, of {len(stamps)} pictures")
     if settings.views and settings.views < len(chosen):

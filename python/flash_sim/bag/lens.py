@@ -101,8 +101,9 @@ def _distortion_of(name, d, where):
         if len(d) < 8 or d[8:].any():
             raise refusal(where, f"found {len(d)} coefficients of {name}, expected 8, or zeros after them")
         return "rational_polynomial", tuple(float(value) for value in d[:8])
-    raise refusal(where, f"found the distortion model {name}, expected plumb_bob or rational_polynomial: rectify the pictures, or "
-                         "name a lens of such pictures by --camera-info")
+    raise refusal(where,
+                  f"found the distortion model {name}, expected plumb_bob or rational_polynomial: rectify the pictures, or "
+                  "name a lens of such pictures by --camera-info")
 
 
 def _field(message, name):

@@ -17,7 +17,8 @@ def write_lift(recording, camera, stream, tree, folder, settings, said):
     """Writes depth, colour where there is one, times and the gripper into a StagedFolder; how many frames. stream: of
     T_base_gripper, None: it is left out. Throws RecordingError."""
     if camera.depth is None:
-        raise refusal(recording.path, "found no depth (sensor_msgs/Image of 16UC1 or 32FC1, or compressedDepth), expected that of a lift")
+        raise refusal(recording.path,
+                      "found no depth (sensor_msgs/Image of 16UC1 or 32FC1, or compressedDepth), expected that of a lift")
     pairs = cameras.paired_depth(recording.path, camera, said)
     cameras.compare_infos(recording.path, camera, said)
     colour_stamps = camera.stamps[camera.main.name].times
@@ -44,7 +45,7 @@ def write_clouds(recording, topic, stream, tree, folder, settings, said):
         raise refusal(recording.path, topic, f"found clouds in the frames {', '.join(sorted(frames))}, expected one")
     times = np.unique(np.asarray(stamps, np.int64))
     first = int(times[0])
-    low, high = first + round((settings.start or 0) * 1e9), first + round((settings.end if settings.end is not None else 1e9) * 1e9)
+    low, high = (first + round(seconds * streams.SECOND) for seconds in (settings.start or 0, settings.end or 1e9))
     times = _write_gripper(recording.path, stream, times[(times >= low) & (times <= high)], topic, folder, said)
     names = {int(time): f"{number:06d}" for number, time in enumerate(times)}
     for _, message in recording.messages([topic]):
@@ -52,7 +53,8 @@ def write_clouds(recording, topic, stream, tree, folder, settings, said):
             points = clouds.points_of(message, f"{recording.path}: {topic}")
             folder.write(f"{VIEW}/{names[stamp_of(message)]}.ply", clouds.ply(points))
     if not _write_place(recording.path, frames.pop(), tree, settings, folder, said):
-        raise refusal(recording.path, topic, "found clouds in a frame whose place on the base is not known, expected --extrinsics FILE")
+        raise refusal(recording.path, topic,
+                      "found clouds in a frame whose place on the base is not known, expected --extrinsics FILE")
     return len(times)
 
 

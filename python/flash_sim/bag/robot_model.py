@@ -77,7 +77,8 @@ def robot_model(text, where, base="", tip="", usual_tips=()):
 
 def _only(links, where, what, option):
     if len(links) != 1:
-        raise refusal(where, f"found {len(links)} links that can be {what} ({', '.join(sorted(links))}), expected one: state {option}")
+        raise refusal(where,
+                      f"found {len(links)} links that can be {what} ({', '.join(sorted(links))}), expected one: state {option}")
     return next(iter(links))
 
 

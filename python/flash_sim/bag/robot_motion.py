@@ -13,8 +13,9 @@ def poses_at(path, stream, stamps, name):
     """(transforms (n, 4, 4), which of the stamps have one (m,) bool) at the stamps [ns] of a topic. Throws RecordingError where a
     stamp falls into a gap of more than 0.1 s between poses, and where clocks differ."""
     if not len(stream.times):
-        raise refusal(path, stream.source, "found a tool that stands still on the base, expected a frame that moves between: state --base "
-                                           "and --tool")
+        raise refusal(path, stream.source,
+                      "found a tool that stands still on the base, expected a frame that moves between: state --base "
+                      "and --tool")
     streams.expect_one_clock(path, name, stamps, stream.source, stream.times)
     found = [stream.at(int(stamp)) for stamp in stamps]
     inside = np.array([pose is not None for pose in found])
@@ -22,8 +23,9 @@ def poses_at(path, stream, stamps, name):
         raise refusal(path, f"found no picture of {name} at a time of {stream.source}")
     for stamp, pose in zip(stamps, found):
         if pose is not None and pose[1] > streams.LARGEST_GAP:
-            raise refusal(path, stream.source, f"found a gap of {pose[1] * 1e-9:.3g} s between poses about {streams.seconds(stamp)} s, "
-                                               "expected at most 0.1 s; --from and --until cut it off")
+            raise refusal(path, stream.source,
+                          f"found a gap of {pose[1] * 1e-9:.3g} s between poses about {streams.seconds(stamp)} s, "
+                          "expected at most 0.1 s; --from and --until cut it off")
     return np.array([pose[0] for pose in found if pose is not None]), inside
 
 

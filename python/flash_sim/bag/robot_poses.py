@@ -14,8 +14,8 @@ POSE_KINDS = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStam
               "nav_msgs/Odometry", "franka_msgs/FrankaState", "franka_msgs/FrankaRobotState")
 JOINT_KIND, DESCRIPTION = "sensor_msgs/JointState", "robot_description"
 BASES = ("base_link", "panda_link0", "fr3_link0", "fer_link0", "link_base", "base", "base_footprint", "world")
-TOOLS = ("tcp", "tool0", "panda_hand_tcp", "fr3_hand_tcp", "fer_hand_tcp", "link_tcp", "tool_link", "ee_link", "panda_hand", "fr3_hand",
-         "flange", "panda_link8", "fr3_link8", "gripper")
+TOOLS = ("tcp", "tool0", "panda_hand_tcp", "fr3_hand_tcp", "fer_hand_tcp", "link_tcp", "tool_link", "ee_link", "panda_hand",
+         "fr3_hand", "flange", "panda_link8", "fr3_link8", "gripper")
 FEW = 12  # names in a message
 
 
@@ -55,9 +55,10 @@ def read_robot_poses(recording, tree, topics, base="", tool="", urdf=""):
     """The stream of T_base_tool of the one topic of `topics`. base, tool: frames or links; empty: as usual names say. urdf: a file
     of the robot, where the recording has no description. Throws RecordingError where there are several, or none."""
     if not topics:
-        raise refusal(recording.path, "found no poses of the robot (/tf with a frame that moves, joint states, PoseStamped, Odometry or "
-                                      "Franka's state), expected one topic of them: give them by --poses FILE.tum, or leave "
-                                      "them out by --without-poses")
+        raise refusal(recording.path,
+                      "found no poses of the robot (/tf with a frame that moves, joint states, PoseStamped, Odometry or "
+                      "Franka's state), expected one topic of them: give them by --poses FILE.tum, or leave "
+                      "them out by --without-poses")
     if len(topics) > 1:
         raise refusal(recording.path, f"found poses on {', '.join(topics[:FEW])}, expected one: choose by --topics")
     kind = recording.topics[topics[0]].kind
@@ -102,8 +103,9 @@ def _frames(path, tree, base, tool):
     if base and tool:
         return base, tool
     known = ", ".join(tree.frames[:FEW]) + (" ..." if len(tree.frames) > FEW else "")
-    raise refusal(path, f"found no usual name for the robot's {'tool' if base else 'base'} among the frames {known}: state --base "
-                        "and --tool")
+    raise refusal(path,
+                  f"found no usual name for the robot's {'tool' if base else 'base'} among the frames {known}: state --base "
+                  "and --tool")
 
 
 def _joints(recording, topic, base, tool, urdf):
@@ -117,7 +119,8 @@ def _joints(recording, topic, base, tool, urdf):
             rows.append([values[name] for name in model.moving])
     where = (recording.path, topic)
     if not rows:
-        raise refusal(*where, f"found joints {', '.join(sorted(names))}, expected {', '.join(model.moving)} of the robot's description")
+        raise refusal(*where,
+                      f"found joints {', '.join(sorted(names))}, expected {', '.join(model.moving)} of the robot's description")
     joints = np.asarray(rows, np.float64)
     if not np.abs(joints).max() < 100:
         raise refusal(*where, f"found a joint at {np.abs(joints).max():.4g}, expected radians and metres")
@@ -156,8 +159,8 @@ def _pose(message, where):
     if hasattr(message, "O_T_EE"):  # column by column
         matrix = np.asarray(message.O_T_EE, np.float64).reshape(4, 4).T
         if np.abs(matrix[3] - [0, 0, 0, 1]).max() > rigid.ROTATION_TOLERANCE:
-            raise refusal(*where, "O_T_EE", f"found the last row {', '.join(f'{value:.4g}' for value in matrix[3])}, expected 0, 0, 0, 1: "
-                                            "was it written row by row?")
+            last = ", ".join(f"{value:.4g}" for value in matrix[3])
+            raise refusal(*where, "O_T_EE", f"found the last row {last}, expected 0, 0, 0, 1: was it written row by row?")
         return matrix[:3, 3], rigid.quaternion_of(rigid.expect_rotation(matrix[:3, :3], *where, "O_T_EE"))
     if hasattr(message, "transform"):
         t, r = message.transform.translation, message.transform.rotation

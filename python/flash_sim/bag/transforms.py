@@ -60,7 +60,8 @@ class TransformTree:
         """The stream of T_base_tool. Throws RecordingError where a frame is unknown, or no way leads from one to the other."""
         for frame in (base, tool):
             if frame not in self.frames:
-                raise refusal(self._path, f"found no frame {frame} in /tf or /tf_static, expected one of {', '.join(self.frames)}")
+                raise refusal(self._path,
+                              f"found no frame {frame} in /tf or /tf_static, expected one of {', '.join(self.frames)}")
         way = self.path_of(base, tool)
         if way is None:
             raise refusal(self._path, f"found no chain of transforms from {base} to {tool}: {base} hangs on "
