@@ -178,7 +178,8 @@ def _next(settings, count):
         return f"{count} pictures, named by their times; put the robot's poses beside them, poses.tum"
     offset = " --time-offset" if settings.every is not None else ""
     setup, target = settings.setup or "eye-in-hand", settings.target or "chessboard:9x6:0.025"
-    return f"{count} views\nnext: flash-calib handeye {out} --setup {setup} --target {target}{offset} -o camera.json"
+    yours = "" if settings.setup and settings.target else ", with your setup and target"
+    return f"{count} views\nnext{yours}: flash-calib handeye {out} --setup {setup} --target {target}{offset} -o camera.json"
 
 
 def run(settings):
