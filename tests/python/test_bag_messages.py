@@ -220,45 +220,76 @@ def test_compressed_depth(tmp_path):
     assert np.nanmax(np.abs(found - metres) / metres**2) < 0.5 / a + 1e-7
 
 
-def sdk(cell, units=None, name="Intel RealSense D435", turn=np.eye(3), depth_lens=LENS):
-    """What RealSense's own recordings hold, in device 0: depth in sensor 0, colour in sensor 1."""
-    depth, colour = "/device_0/sensor_0/Depth_0", "/device_0/sensor_1/Color_0"
+DEPTH_STREAM, COLOUR_STREAM = "/device_0/sensor_0/Depth_0", "/device_0/sensor_1/Color_0"
+
+
+def sdk(texts=False, units=None, name="Intel RealSense D435", turn=np.eye(3), depth_lens=LENS, place=(0.015, 0, 0)):
+    """What RealSense's own recordings hold: depth in sensor 0, colour in sensor 1, both where p = R p_reference + t. texts: as .db3
+    has them; else messages, as .bag has."""
+    cell = Cell()
+
+    def add(topic, kind, data, **fields):
+        cell.entries.append((topic, kind, START, {"data": data} if data is not None else fields))
     for time in picture_times():
-        cell.image(f"{depth}/image/data", time, COUNTS, "mono16", "0")
-        cell.image(f"{colour}/image/data", time, PIXELS, "rgb8", "0")
-    for top, lens in ((depth, depth_lens), (colour, LENS)):
-        cell.info(f"{top}/info/camera_info", 0, lens, "0", START, distortion_model="Inverse Brown Conrady")
-    still_there = {"translation": fixtures.xyz([0, 0, 0]), "rotation": {"w": 1}}
-    cell.entries.append((f"{depth}/tf/0", "geometry_msgs/msg/Transform", START, still_there))
-    moved = {"translation": fixtures.xyz([0.015, 0, 0]), "rotation": fixtures.xyzw(pose([0, 0, 0], turn))}
-    cell.entries.append((f"{colour}/tf/0", "geometry_msgs/msg/Transform", START, moved))
-    cell.entries.append(("/device_0/info", "diagnostic_msgs/msg/KeyValue", START, {"key": "Name", "value": name}))
+        cell.image(f"{DEPTH_STREAM}/image/data", time, COUNTS, "mono16", "0")
+        cell.image(f"{COLOUR_STREAM}/image/data", time, PIXELS, "rgb8", "0")
+    text = "std_msgs/msg/String"
+    for top, lens, r, t in ((DEPTH_STREAM, depth_lens, np.eye(3), (0, 0, 0)), (COLOUR_STREAM, LENS, turn, place)):
+        if texts:
+            add(f"{top}/camera_info", text, f"width={WIDTH};height={HEIGHT};fx={lens.fx};ppx={lens.cx};fy={lens.fy};ppy={lens.cy};"
+                "model=Inverse Brown Conrady;coeffs=0,0,0,0,0")
+            add(f"{top}/tf/ref_0", text, f"rotation={','.join(f'{v:.6f}' for v in r.T.ravel())};translation={','.join(map(str, t))}")
+        else:
+            cell.info(f"{top}/info/camera_info", 0, lens, "0", START, distortion_model="Inverse Brown Conrady")
+            add(f"{top}/tf/0", "geometry_msgs/msg/Transform", None, translation=fixtures.xyz(t),
+                rotation=fixtures.xyzw(pose([0, 0, 0], r)))
+    if texts:
+        add("/device_0/info", text, f"Serial Number=1234;Name={name};Firmware Version=5")
+    else:
+        add("/device_0/info", "diagnostic_msgs/msg/KeyValue", None, key="Name", value=name)
     if units is not None:
-        cell.entries.append(("/device_0/sensor_0/option/Depth_Units/value", "std_msgs/msg/Float32", START, {"data": units}))
+        add("/device_0/sensor_0/option/Depth_Units/value", text if texts else "std_msgs/msg/Float32", f"{units:f}" if texts else units)
     return cell
 
 
+@pytest.mark.parametrize("texts", [False, True])
 @pytest.mark.parametrize("units, name, scale", [(0.001, "Intel RealSense D435", 0.001), (0.0001, "Intel RealSense D405", 0.0001),
                                                 (None, "Intel RealSense L515", 0.00025), (None, "Intel RealSense D435", 0.001)])
-def test_metres_a_count_of_realsense(tmp_path, units, name, scale):
+def test_metres_a_count_of_realsense(tmp_path, units, name, scale, texts):
     """librealsense#8058: .00025 m of an L515. There are no poses in such files."""
-    folder = converted(tmp_path, sdk(Cell(), units, name), "--without-poses", "--topics", "/device_0/sensor_0/Depth_0/image/data",
-                       "--for", "segment")
+    folder = converted(tmp_path, sdk(texts, units, name), "--without-poses", "--topics", f"{DEPTH_STREAM}/image/data", "--for",
+                       "segment")
     found = depth_of(folder / "camera1")
     metres = found * 0.001 if found.dtype == np.uint16 else found
     assert np.abs(metres - COUNTS * scale).max() < 1e-7
 
 
-def test_depth_is_reprojected_by_realsenses_own_extrinsics(tmp_path):
+@pytest.mark.parametrize("texts", [False, True])
+def test_depth_is_reprojected_by_realsenses_own_extrinsics(tmp_path, texts):
     """A flat wall: where the colour sees it, it sees its distance, wherever the depth camera saw that pixel."""
-    cell = sdk(Cell(), 0.001, depth_lens=fixtures.lens(WIDTH, HEIGHT, 12.0))
-    for entry in cell.entries:
-        if entry[0].endswith("Depth_0/image/data"):
-            entry[3]["data"] = np.full(WIDTH * HEIGHT, 800, "<u2").view(np.uint8)
-    found = depth_of(converted(tmp_path, cell, "--without-poses", "--every", "0.5"), f"depth/{START // 10**9}.299000000")
-    assert found.dtype == np.float32
-    # 0.8 m everywhere but for a column at the edge, 14 x 0.015 / 0.8 px wide, which the depth camera does not reach.
-    assert np.nanmax(np.abs(found - 0.8)) < 1e-6 and np.isnan(found).mean() < 0.1
+    turn = rotation([0, 1, 0], 0.06)
+    for changes in ({}, {"turn": turn, "place": (0, 0, 0)}):
+        cell = sdk(texts, 0.001, depth_lens=fixtures.lens(WIDTH, HEIGHT, 12.0), **changes)
+        for entry in cell.entries:
+            if entry[0].endswith("Depth_0/image/data"):
+                entry[3]["data"] = np.full(WIDTH * HEIGHT, 1000, "<u2").view(np.uint8)
+        found = depth_of(converted(tmp_path, cell, "--without-poses", "--every", "0.5"), f"depth/{START // 10**9}.299000000")
+        assert found.dtype == np.float32
+        if changes:
+            expect_turned_wall(found, turn)
+        else:
+            # 1 m everywhere but for a column at the edge, 14 x 0.015 px wide, which the depth camera does not reach.
+            assert np.nanmax(np.abs(found - 1)) < 1e-6 and np.isnan(found).mean() < 0.1
+
+
+def test_raw_frames_of_realsense_are_refused_by_name(tmp_path, capsys):
+    import sqlite3
+    path = sdk(True).write(tmp_path, "db3")
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE topics SET type = 'librealsense/raw_frame' WHERE type = 'sensor_msgs/msg/Image'")
+    database.close()
+    assert main([str(path), "-o", str(tmp_path / "out"), "--without-poses"]) == 2
+    assert "rs-convert" in capsys.readouterr().err
 
 
 def test_reprojection_against_rays(tmp_path):

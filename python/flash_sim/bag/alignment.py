@@ -1,9 +1,7 @@
 """Depth on the pixels of the colour picture, by the extrinsics that the recording itself carries."""
-import re
-
 import numpy as np
 
-from flash_sim.bag import orbbec_sdk, rigid
+from flash_sim.bag import orbbec_sdk, realsense, rigid
 from flash_sim.bag.errors import refusal
 
 FARTHEST = 1.0    # between two cameras of one device [m]
@@ -106,18 +104,13 @@ def _checked(path, source, matrix):
 
 
 def _realsense_file(recording, colour, depth):
-    """RealSense writes of each stream where its reference is: p_stream = R p_reference + t."""
-    tops = [re.sub(r"/image/data$", "/tf/", picture.base) for picture in (colour, depth)]
-    names = [next((name for name in recording.topics if name.startswith(top) and top.endswith("/tf/")), None) for top in tops]
-    if None in names or names[0].rsplit("/", 1)[1] != names[1].rsplit("/", 1)[1]:
+    """RealSense writes of each stream where its reference is."""
+    found = [realsense.reference(recording, picture.base) for picture in (colour, depth)]
+    if None in found or found[0][1] != found[1][1]:
         return None
-    matrices = []
-    for name in names:
-        message = recording.first(name)
-        t, r = message.translation, message.rotation
-        quaternion = rigid.unit_quaternion((r.x, r.y, r.z, r.w), recording.path, name)
-        matrices.append(rigid.transform(rigid.rotation_of(quaternion), (t.x, t.y, t.z)))
-    return names[1], matrices[0] @ rigid.inverse(matrices[1])
+    for name, _, matrix in found:
+        rigid.expect_rotation(matrix[:3, :3], recording.path, name)
+    return found[1][0], found[0][2] @ rigid.inverse(found[1][2])
 
 
 def _orbbec_file(recording, colour, depth):

@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flash_sim.bag import alignment, choice, png, streams
+from flash_sim.bag import alignment, choice, png, realsense, streams
 from flash_sim.bag.arrival import LARGEST_DELAY
-from flash_sim.bag.depth_scale import MILLIMETRES, depth_scale
 from flash_sim.bag.errors import refusal
 from flash_sim.bag.lens import Lens, expect_size, lens_of
 from flash_sim.bag.pictures import depth_of, frame_of, picture_of, stamp_of
+from flash_sim.bag.realsense import MILLIMETRES
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def open_camera(recording, colour, depth, tree, scale=None, own_lens=False):
         matrix = alignment.colour_from_depth(recording, colour, depth, *pair, tree)
         align = None if matrix is None else alignment.Reprojection(*pair[::-1], matrix)
     if depth and scale is None:
-        scale, _ = depth_scale(recording, depth.name)
+        scale = realsense.depth_scale(recording, depth.name)
     stamps = _stamps(recording, [picture for picture in (colour, depth) if picture])
     return Camera(colour, depth, lenses[(colour or depth).name], lenses[depth.name] if depth else None, align, scale or MILLIMETRES,
                   stamps, info_stamps)
@@ -154,6 +154,7 @@ def _lens(recording, picture):
     where = f"{recording.path}: {topic}"
     lens, stamps, delays = None, [], []
     for _, time, message in recording.logged_messages([topic]):
+        message = realsense.camera_info(message, where)
         found = lens_of(message, where, picture.rectified)
         if lens not in (None, found):
             raise refusal(where,

@@ -1,7 +1,7 @@
 """Which topics of a recording are taken: pictures, depth, clouds, and the lens that belongs to each."""
 from dataclasses import dataclass
 
-from flash_sim.bag import orbbec_sdk
+from flash_sim.bag import orbbec_sdk, realsense
 from flash_sim.bag.errors import refusal
 from flash_sim.bag.pictures import BAYER, COLOURS, encoding_of, frame_of, is_depth
 
@@ -44,9 +44,12 @@ class PictureTopic:
 
 
 def survey(recording):
-    """The PictureTopics of a recording that have messages, in order of name."""
+    """The PictureTopics of a recording that have messages, in order of name. Throws RecordingError of RealSense's raw ones."""
     found = []
     for topic in recording.topics.values():
+        if topic.kind == realsense.RAW_KIND:
+            raise refusal(recording.path, topic.name, "found raw frames of an early RealSense .db3, which its SDK alone reads, expected "
+                                                      f"pictures: rs-convert -i {recording.path} -p FOLDER/ writes them")
         if topic.count and (topic.kind in PICTURE_KINDS or orbbec_sdk.FRAMES.fullmatch(topic.name)):
             message = recording.first(topic.name)
             depth = is_depth(message, topic.name)
@@ -88,8 +91,7 @@ def info_topic(recording, picture):
     base = picture.base
     parent = base.rsplit("/", 1)[0]
     names = [orbbec_sdk.profile_topic(picture.name), f"{parent}/camera_info", f"{base}/camera_info"]
-    if base.endswith("/image/data"):  # RealSense
-        names.append(base.removesuffix("image/data") + "info/camera_info")
+    names += realsense.info_topics(base)
     for name in names:
         if name in recording.topics and recording.topics[name].count:
             return name

@@ -90,7 +90,7 @@ def expect_size(lens, width, height, where):
 
 
 def _distortion_of(name, d, where):
-    word = name.lower()
+    word = name.lower() if name.lower() in (*PLUMB_BOB, *RATIONAL) else name.lower().replace("_", " ")
     if word == INVERSE and not d.any():
         word = "plumb_bob"
     if word in PLUMB_BOB or (word in RATIONAL and not d[5:].any()):
