@@ -13,6 +13,7 @@ from bag_fixtures import CONTAINERS, LATE, SECOND, START, Cell, between, draw_bo
 from flash_sim.bag.__main__ import main
 
 pytest.importorskip("rosbags", reason="rosbags is not installed, which reads bags")
+pytest.importorskip("PIL", reason="Pillow is not installed, which reads compressed pictures")
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAMS = pathlib.Path(os.environ.get("FLASH_PROGRAMS", ROOT / "build/release/bin"))

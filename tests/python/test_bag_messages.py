@@ -14,6 +14,7 @@ from flash_sim.bag import alignment, orbbec_sdk, pictures, rigid
 from flash_sim.bag.__main__ import main
 from flash_sim.bag.lens import Lens, lens_of
 from flash_sim.bag.robot_model import robot_model
+from flash_sim.bag.robot_poses import JointStream
 from flash_sim.bag.streams import PoseStream
 
 pytest.importorskip("rosbags", reason="rosbags is not installed, which reads bags")
@@ -76,6 +77,12 @@ def test_joints_with_the_description_of_the_robot(tmp_path):
     cell.entries.pop()
     (tmp_path / "arm.urdf").write_text(ARM)
     expect_poses(converted(tmp_path, cell, "--urdf", str(tmp_path / "arm.urdf"), "--base", "base", "--tool", "tool0"), expected)
+
+
+def test_joints_that_begin_anew_at_half_a_turn():
+    model = robot_model(ARM, "arm.urdf", "base", "tool0")
+    stream = JointStream("x", model, [0, 20 * MS], [[0.1, 0, np.pi - 0.02], [0.3, 0, 0.02 - np.pi]])
+    assert np.abs(stream.at(5 * MS)[0] - arm(0.15, 0, np.pi - 0.01)).max() < 1e-12
 
 
 def test_kinematics_from_one_link_to_another():

@@ -1,5 +1,7 @@
 """What python -m flash_sim.bag refuses: one line that names it, exit code 2, and nothing left behind."""
+import io
 import struct
+import sys
 
 import bag_fixtures as fixtures
 import numpy as np
@@ -218,7 +220,6 @@ def test_depth_of_eight_bits(refuse):
     line = refuse(add_depth(small(), pixels=COUNTS.astype(np.uint8), encoding="mono8"))
     assert DEPTH in line and "mono8" in line and "16UC1" in line
     from PIL import Image
-    import io
     file = io.BytesIO()
     Image.fromarray(COUNTS.astype(np.uint8)).save(file, "JPEG")
     cell = small()
@@ -352,6 +353,24 @@ def test_folders_that_are_there_and_options_that_are_wrong(tmp_path, capsys):
     assert "invalid choice" in refused(capsys, tmp_path, source, "--for", "grid", "--force")
     assert "--views" in refused(capsys, tmp_path, source, "--views", "-1", "--force")
     assert "none.tum" in refused(capsys, tmp_path, source, "--poses", "none.tum", "--force")
+
+
+def test_a_part_in_which_nothing_is(refuse):
+    assert "between --from and --until" in refuse(small(), "--from", "100")
+    assert "between --from and --until" in refuse(add_depth(small()), "--from", "2", "--until", "1", "--for", "segment")
+
+
+@pytest.mark.parametrize("module", ["rosbags.rosbag2", "PIL"])
+def test_packages_that_are_not_there(tmp_path, capsys, monkeypatch, module):
+    from PIL import Image
+    file = io.BytesIO()
+    Image.fromarray(PIXELS).save(file, "PNG")
+    cell = small(pictures=False)
+    for time in picture_times():
+        cell.compressed(f"{COLOUR}/compressed", time, file.getvalue(), "png")
+    source = cell.write(tmp_path, "mcap")
+    monkeypatch.setitem(sys.modules, module, None)
+    assert "pip install 'flash-sim[bag]'" in refused(capsys, tmp_path, source)
 
 
 def test_force_keeps_what_others_put_there(tmp_path):

@@ -130,8 +130,8 @@ def convert(recording, settings, said):
                 return lift_folder.write_clouds(recording, cloud, stream, tree, folder, settings, said)
     if not (colour or depth):
         raise RecordingError(f"{recording.path}: found no pictures and no depth, expected sensor_msgs/Image or CompressedImage")
-    camera = between(open_camera(recording, colour, depth, tree, settings.depth_scale, bool(settings.camera_info)), settings.start,
-                     settings.end)
+    camera = open_camera(recording, colour, depth, tree, settings.depth_scale, bool(settings.camera_info))
+    camera = between(recording.path, camera, settings.start, settings.end)
     _say_camera(camera, said)
     if topic:
         main = camera.main.name

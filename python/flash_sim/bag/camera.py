@@ -62,15 +62,12 @@ def open_camera(recording, colour, depth, tree, scale=None, own_lens=False):
                   stamps, info_stamps)
 
 
-def between(camera, start, end):
-    """The camera with pictures from `start` to `end` only, seconds since the first; None: all."""
+def between(path, camera, start, end):
+    """The camera with pictures from `start` to `end` only, seconds since the first; None: all. Throws RecordingError where there is
+    none."""
     main = camera.main.name
     stamps = camera.stamps[main]
-    first = int(stamps.times[0])
-    low = first + round((start or 0) * streams.SECOND)
-    high = first + round(end * streams.SECOND) if end is not None else np.iinfo(np.int64).max
-    inside = stamps.times[(stamps.times >= low) & (stamps.times <= high)]
-    return replace(camera, stamps={**camera.stamps, main: replace(stamps, times=inside)})
+    return replace(camera, stamps={**camera.stamps, main: replace(stamps, times=streams.cut(path, main, stamps.times, start, end))})
 
 
 def pictures(recording, camera, wanted):

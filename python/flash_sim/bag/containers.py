@@ -170,6 +170,8 @@ def _told(path, topic=""):
         yield
     except (RecordingError, GeneratorExit, KeyboardInterrupt):
         raise
+    except OSError as error:
+        raise refusal(path, topic, f"cannot be read: {error.strerror or error}") from error
     except Exception as error:  # struct.error, AssertionError, sqlite errors: whatever damaged bytes lead to
         line = " ".join(str(error).split()) or type(error).__name__
         if "not indexed" in line or "index looks damaged" in line:

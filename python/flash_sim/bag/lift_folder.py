@@ -43,10 +43,8 @@ def write_clouds(recording, topic, stream, tree, folder, settings, said):
         frames.add(frame_of(message))
     if len(frames) != 1:
         raise refusal(recording.path, topic, f"found clouds in the frames {', '.join(sorted(frames))}, expected one")
-    times = np.unique(np.asarray(stamps, np.int64))
-    first = int(times[0])
-    low, high = (first + round(seconds * streams.SECOND) for seconds in (settings.start or 0, settings.end or 1e9))
-    times = _write_gripper(recording.path, stream, times[(times >= low) & (times <= high)], topic, folder, said)
+    times = streams.cut(recording.path, topic, np.unique(np.asarray(stamps, np.int64)), settings.start, settings.end)
+    times = _write_gripper(recording.path, stream, times, topic, folder, said)
     names = {int(time): f"{number:06d}" for number, time in enumerate(times)}
     for _, message in recording.messages([topic]):
         if stamp_of(message) in names:

@@ -29,6 +29,11 @@ class RobotModel:
         """Names of the joints that move, from the base on."""
         return [joint.name for joint in self._joints if joint.kind != "fixed"]
 
+    @property
+    def turning(self):
+        """Which of `moving` turn, bool."""
+        return np.array([joint.kind != "prismatic" for joint in self._joints if joint.kind != "fixed"])
+
     def pose(self, angles):
         """T_base_tip (4, 4) of the values of `moving` [rad, m]."""
         product, values = np.eye(4), iter(angles)

@@ -36,8 +36,9 @@ class JointStream:
         if found is None:
             return None
         before, after, share = found
-        joints = (1 - share) * self._joints[before] + share * self._joints[after]
-        return self._model.pose(joints), int(self.times[after] - self.times[before])
+        way = self._joints[after] - self._joints[before]
+        way = np.where(self._model.turning, (way + np.pi) % (2 * np.pi) - np.pi, way)  # an angle may begin anew at half a turn
+        return self._model.pose(self._joints[before] + share * way), int(self.times[after] - self.times[before])
 
 
 def pose_topics(recording, tree, wanted=()):

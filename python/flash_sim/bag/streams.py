@@ -129,6 +129,18 @@ def paired(times, others):
     return Pairs(nearest, others[nearest] - times, half_frame(times))
 
 
+def cut(path, name, times, start, end):
+    """The times (n,) [ns] of a topic from `start` to `end`, seconds since the first of them; None: all. Throws RecordingError where
+    none is left."""
+    low = int(times[0]) + round((start or 0) * SECOND)
+    high = int(times[0]) + round(end * SECOND) if end is not None else int(times[-1])
+    inside = times[(times >= low) & (times <= high)]
+    if not len(inside):
+        length = (int(times[-1]) - int(times[0])) / SECOND
+        raise refusal(path, name, f"found nothing between --from and --until, expected times within its {length:.3g} s")
+    return inside
+
+
 def expect_one_clock(path, name, times, other, others):
     """Throws RecordingError where stamps of two topics are more than a day apart, or do not overlap."""
     if not len(times) or not len(others):
