@@ -5,10 +5,12 @@ import shlex
 import signal
 import sys
 
+import numpy as np
+
 from flash_sim.bag import arrival, choice, hand_eye_folder, lift_folder
 from flash_sim.bag.camera import between, open_camera
 from flash_sim.bag.containers import Recording
-from flash_sim.bag.errors import RecordingError
+from flash_sim.bag.errors import RecordingError, one_line
 from flash_sim.bag.robot_poses import JOINT_KIND, POSE_KINDS, pose_topics, read_robot_poses, read_tum
 from flash_sim.bag.staged_folder import StagedFolder
 from flash_sim.bag.streams import interval
@@ -36,7 +38,7 @@ class Said:
     def warning(self, text):
         """On stderr, unless it is empty."""
         if text:
-            print(f"{NAME}: warning: {text}", file=sys.stderr)
+            print(one_line(f"{NAME}: warning: {text}"), file=sys.stderr)
 
     def left_out(self, topic, count, why):
         """Of pictures, where there are any."""
@@ -103,7 +105,7 @@ def list_topics(recording):
     pictures = {picture.name: picture for picture in choice.survey(recording)}
     width = max((len(name) for name in recording.topics), default=0)
     for topic in recording.topics.values():
-        print(f"{topic.name:{width}}  {topic.count:6d}  {topic.kind}{_taken_for(topic, pictures)}")
+        print(one_line(f"{topic.name:{width}}  {topic.count:6d}  {topic.kind}{_taken_for(topic, pictures)}"))
 
 
 def _taken_for(topic, pictures):
@@ -201,7 +203,8 @@ def main(arguments=None):
     """Runs the command line `arguments`; the exit code. Whatever is refused is one line on stderr and 2."""
     settings = parser().parse_args(arguments)
     try:
-        return run(settings)
+        with np.errstate(all="ignore"):  # numbers that are none are refused where they count
+            return run(settings)
     except RecordingError as error:
         print(f"{NAME}: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -212,7 +215,7 @@ def main(arguments=None):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except OSError as error:
-        print(f"{NAME}: {error.filename or settings.out}: {error.strerror}", file=sys.stderr)
+        print(one_line(f"{NAME}: {error.filename or settings.out}: {error.strerror}"), file=sys.stderr)
         return FAILED
 
 

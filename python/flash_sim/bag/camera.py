@@ -160,6 +160,8 @@ def _lens(recording, picture):
         lens = found
         stamps.append(stamp_of(message))
         delays.append(time - stamps[-1])
+    if lens is None:
+        raise refusal(where, "found no message, expected those that the index tells of: the file is damaged")
     return lens, Stamps(np.unique(stamps), int(np.median(delays)))
 
 

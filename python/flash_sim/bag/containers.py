@@ -13,9 +13,10 @@ OF_VENDORS = {
     ".mkv": ("an Azure Kinect recording", "ffmpeg -i {} -map 0:1 -vsync 0 FOLDER/depth/%06d.png"),
     ".zdf": ("a Zivid frame", "python convert_zdf.py --ply {}"),
 }
-# Of drivers, for files that carry no definitions: the older .db3.
+# Beside those of ROS, for files that carry no definitions, as the older .db3.
 EXTRINSICS = "std_msgs/Header header\nfloat64[9] rotation\nfloat64[3] translation\n"
-OF_DRIVERS = {"realsense2_camera_msgs/msg/Extrinsics": EXTRINSICS, "orbbec_camera_msgs/msg/Extrinsics": EXTRINSICS}
+DEFINITIONS = {"realsense2_camera_msgs/msg/Extrinsics": EXTRINSICS, "orbbec_camera_msgs/msg/Extrinsics": EXTRINSICS,
+               "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n"}
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,10 @@ class Recording:
                 yield topic, int(time), message
 
     def first(self, name):
-        """The first message of a topic; None where there is none."""
-        return next((message for _, message in self.messages([name])), None)
+        """The first message of a topic. Throws RecordingError where there is none."""
+        for _, message in self.messages([name]):
+            return message
+        raise refusal(self.path, name, "found no message, expected those that the index tells of: the file is damaged")
 
     def _open(self, path):
         path = readable(path)
@@ -89,8 +92,9 @@ class Recording:
             self._reader.open()
         self._stack.callback(self._reader.close)
         self._known = get_typestore(Stores.ROS1_NOETIC if self._is_one else Stores.LATEST)
-        for kind, definition in OF_DRIVERS.items():
-            self._known.register(get_types_from_msg(definition, kind))
+        for kind, definition in DEFINITIONS.items():
+            if kind not in self._known.fielddefs:
+                self._known.register(get_types_from_msg(definition, kind))
         self._told_types = get_typestore(Stores.EMPTY)
         with _told(self.path):
             self._learn_types()
@@ -99,7 +103,8 @@ class Recording:
         self._topics = {name: found[name] for name in sorted(found)}
 
     def _learn_types(self):
-        """Takes the definitions that the file carries; each type once, and what cannot be understood not at all."""
+        """Takes the definitions that the file carries; each type once. Those that cannot be understood, or lack a field of ROS's own,
+        are damaged: then that of ROS holds."""
         from rosbags.interfaces import MessageDefinitionFormat
         from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
         for connection in self._reader.connections:
@@ -111,10 +116,15 @@ class Recording:
                     types = get_types_from_idl(_idl(definition.data))
                 else:
                     continue
-                new = {name: fields for name, fields in types.items() if name not in self._told_types.fielddefs}
+                new = {name: fields for name, fields in types.items()
+                       if name not in self._told_types.fielddefs and not self._lacks_fields(name, fields)}
                 self._told_types.register(new)
             except TypesysError:  # of a topic that may never be asked for
                 continue
+
+    def _lacks_fields(self, name, definition):
+        known = self._known.fielddefs.get(name, ((), ()))[1]
+        return not {field.lower() for field, _ in known} <= {field.lower() for field, _ in definition[1]}
 
     def _message(self, connection, raw):
         if orbbec_sdk.writes(connection.topic):

@@ -150,7 +150,7 @@ def _pose_topic(recording, topic):
         places.append(rigid.place_of(place, *where))
         quaternions.append(rigid.unit_quaternion(quaternion, *where))
         frames.add(frame_of(message))
-    if len(frames) > 1:
+    if len(frames) != 1:
         raise refusal(recording.path, topic, f"found poses in the frames {', '.join(sorted(frames))}, expected one")
     return PoseStream(topic, stamps, places, quaternions)
 
