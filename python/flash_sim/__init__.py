@@ -4,6 +4,15 @@ RealtimeSim steps a scene; Asset reads what was identified. All numbers are in S
 is loaded with the first of these names; flash_sim.bag needs none of it.
 """
 import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from flash_sim._core import State, __version__
+    from flash_sim.asset import Asset
+    from flash_sim.cameras import look_at
+    from flash_sim.depth_noise import DepthNoise, add_depth_noise, jitter_poses
+    from flash_sim.device_array import DeviceArray, to_host
+    from flash_sim.realtime_sim import RealtimeSim
 
 _MODULES = {"State": "_core", "__version__": "_core", "Asset": "asset", "look_at": "cameras", "DeviceArray": "device_array",
             "to_host": "device_array", "DepthNoise": "depth_noise", "add_depth_noise": "depth_noise",

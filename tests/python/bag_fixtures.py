@@ -50,15 +50,15 @@ class Cell:
                   "d": list(lens.d), "p": [*k[:3], 0, *k[3:6], 0, *k[6:], 0]}
         self.add(topic, "sensor_msgs/msg/CameraInfo", stamp, late, frame, **(fields | changes))
 
-    def write(self, folder, container):
-        """The recording in a container below a folder; its path."""
+    def write(self, folder, container, prepare=lambda writer: None):
+        """The recording in a container below a folder; its path. prepare: is given the writer before it is opened."""
         entries = sorted(self.entries, key=lambda entry: entry[2])
         if container == "ros1":
-            return _write_one(folder / "cell.bag", entries)
+            return _write_one(folder / "cell.bag", entries, prepare)
         from rosbags.rosbag2 import StoragePlugin
         mcap = "mcap" in container
         whole = folder / ("mcap_folder" if mcap else "sqlite_folder")
-        _write_two(whole, entries, StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3)
+        _write_two(whole, entries, StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3, prepare)
         if container.endswith("folder"):
             return whole
         lone = folder / f"cell.{container}"
@@ -166,11 +166,13 @@ def _store(name):
     return store
 
 
-def _write_one(path, entries):
+def _write_one(path, entries, prepare):
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores
     store, connections = _store(Stores.ROS1_NOETIC), {}
-    with Writer(path) as writer:
+    writer = Writer(path)
+    prepare(writer)
+    with writer:
         for topic, kind, time, fields in entries:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
@@ -178,11 +180,13 @@ def _write_one(path, entries):
     return path
 
 
-def _write_two(path, entries, plugin):
+def _write_two(path, entries, plugin, prepare):
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores
     store, connections = _store(Stores.ROS2_HUMBLE), {}
-    with Writer(path, version=9, storage_plugin=plugin) as writer:
+    writer = Writer(path, version=9, storage_plugin=plugin)
+    prepare(writer)
+    with writer:
         for topic, kind, time, fields in entries:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)

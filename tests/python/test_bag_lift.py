@@ -78,6 +78,24 @@ def test_five_containers_give_one_folder_and_the_cloth_of_the_frames_themselves(
                                     + ["camera1/extrinsics.json"]), "gripper.tum", "times.csv"]
 
 
+def test_depth_in_metres_is_the_same_cloth(tmp_path, lift):
+    """Of 32FC1, which stays what it is; float32 moves a point of 1 m by 6e-8 m, and the bytes of the clouds with it."""
+    folder, cell = lift
+    other = Cell()
+    for topic, kind, time, fields in cell.entries:
+        if topic == DEPTH:
+            rows = fields["data"].reshape(fields["height"], fields["step"])[:, :2 * fields["width"]]
+            metres = np.ascontiguousarray(rows).view(np.uint16).astype(np.float32) / 1000
+            fields = {**fields, "encoding": "32FC1", "step": 4 * fields["width"], "data": metres.reshape(-1).view(np.uint8)}
+        other.entries.append((topic, kind, time, fields))
+    out = tmp_path / "raw"
+    assert main([str(other.write(tmp_path, "ros1")), "-o", str(out), "--for", "segment", "--quiet"]) == 0
+    assert (out / "camera1/depth/000010.npy").exists()
+    found, expected = segmented(out, tmp_path / "cut"), segmented(folder, tmp_path / "plain")
+    counts = [[int(file.split(b"element vertex ")[1].split()[0]) for file in files.values()] for files in (found, expected)]
+    assert np.abs(np.subtract(*counts)).max() <= 3 and min(counts[1]) > 300
+
+
 def test_the_command_that_comes_next_is_one_that_works(tmp_path, lift, capsys, monkeypatch):
     _, cell = lift
     source = cell.write(tmp_path, "mcap")

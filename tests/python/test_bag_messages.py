@@ -432,3 +432,18 @@ def test_older_files_without_definitions(tmp_path):
     database.close()
     assert main([str(path), "-o", str(tmp_path / "out"), "--quiet"]) == 0
     expect_poses(tmp_path / "out", STOPS)
+
+
+def test_compressed_files(tmp_path):
+    """As rosbag and rosbag2 write them where they are asked to."""
+    from rosbags.rosbag1 import Writer as OneWriter
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode
+    ways = [("ros1", lambda writer, form=form: writer.set_compression(form)) for form in OneWriter.CompressionFormat]
+    ways += [(container, lambda writer, mode=mode: writer.set_compression(mode, CompressionFormat.ZSTD))
+             for container, mode in (("sqlite_folder", CompressionMode.MESSAGE), ("sqlite_folder", CompressionMode.FILE),
+                                     ("mcap_folder", CompressionMode.STORAGE))]
+    for number, (container, prepare) in enumerate(ways):
+        (tmp_path / str(number)).mkdir()
+        path = small().write(tmp_path / str(number), container, prepare)
+        assert main([str(path), "-o", str(tmp_path / f"{number}/out"), "--quiet"]) == 0
+        expect_poses(tmp_path / f"{number}/out", STOPS)

@@ -14,7 +14,7 @@ from flash_sim.bag.errors import RecordingError, one_line
 from flash_sim.bag.robot_poses import JOINT_KIND, POSE_KINDS, pose_topics, read_robot_poses, read_tum
 from flash_sim.bag.staged_folder import StagedFolder
 from flash_sim.bag.streams import interval
-from flash_sim.bag.transforms import TF_KINDS, TransformTree, read_transforms
+from flash_sim.bag.transforms import TF_KINDS, read_transforms
 
 NAME = "flash_sim.bag"
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -144,7 +144,7 @@ def convert(recording, settings, said):
         return hand_eye_folder.write_hand_eye(recording, camera, stream, folder, settings, said)
 
 
-def _robot(recording, tree: TransformTree, settings, said):
+def _robot(recording, tree, settings, said):
     """The stream of T_base_tool, None where it is left out; and its topic, if it has one."""
     if settings.without_poses:
         return None, ""
