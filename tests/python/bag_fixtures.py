@@ -110,7 +110,7 @@ def between(a, b, share):
     return pose((1 - share) * a[:3, 3] + share * b[:3, 3], a[:3, :3] @ way)
 
 
-def draw_board(camera, T_camera_board, columns=9, rows=6, square=0.025, samples=4):
+def draw_board(camera, T_camera_board, columns=9, rows=6, square=0.025, samples=3):
     """(h, w) uint8 of a chessboard of so many inner corners; its frame has x right, y down, z into the board."""
     u, v = np.meshgrid(np.arange(camera.width * samples), np.arange(camera.height * samples))
     u, v = ((grid + 0.5) / samples - 0.5 for grid in (u, v))
