@@ -15,6 +15,7 @@
 #include "data/mesh/mesh_io.h"
 #include "data/mesh/procedural_mesh.h"
 #include "data/motion/trajectory.h"
+#include "data/recording/bag_file.h"
 #include "data/recording/frame_files.h"
 #include "sysid/capture/import_cut.h"
 #include "sysid/capture/segmented_cell.h"
@@ -30,6 +31,7 @@ data::InputError option_error(const char* option, const std::string& found, cons
 
 std::vector<std::string> files_in(const std::string& folder, const std::vector<std::string>& extensions,
                                   const char* what) {
+  data::expect_no_bag(folder, "segment");
   std::vector<std::string> files = data::files_in_order(folder, extensions);
   if (!files.empty()) return files;
   namespace fs = std::filesystem;

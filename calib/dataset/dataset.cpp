@@ -16,6 +16,7 @@
 #include "data/motion/pose_file.h"
 #include "data/motion/pose_numbers.h"
 #include "data/motion/rotation_angles.h"
+#include "data/recording/bag_file.h"
 #include "data/recording/frame_files.h"
 
 namespace flash::calib {
@@ -401,6 +402,7 @@ Dataset read_dataset(const std::string& path, const DatasetOptions& options) {
   dataset.source = path;
   dataset.depth_scale = options.depth_scale;
   if (!fs::exists(path)) throw InputError(path + ": no such folder or file");
+  data::expect_no_bag(path, "handeye");
   if (!fs::is_directory(path)) {
     read_pairs(path, dataset);
     return dataset;

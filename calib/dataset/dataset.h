@@ -57,7 +57,7 @@ struct DatasetOptions {
 /// the first two; beside pictures its robot poses count. Pictures pair with poses by file name, by the last
 /// number in it, by their order where poses have neither, or by time: where stamps are times, the pose is
 /// interpolated within `stream`. A picture without a pose is left out. Throws InputError: nothing found, two
-/// sources of poses, no picture with a pose.
+/// sources of poses, no picture with a pose, a bag (data::expect_no_bag).
 Dataset load_dataset(const std::string& path, const DatasetOptions& options = {});
 
 /// Observations of a set of pairs: poses, no points.

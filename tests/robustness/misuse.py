@@ -433,6 +433,25 @@ def check_digits(options, folder):
                f"plan: range alone {alone}, expected {expected}")
 
 
+def check_bags(options, folder):
+    """A recording in place of a folder: the command that makes one of it."""
+    for name in ("cell.bag", "cell.db3", "cell.mcap"):
+        (folder / name).touch()
+    (folder / "rosbag2").mkdir()
+    (folder / "rosbag2" / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 9\n")
+    for name in ("cell.bag", "cell.db3", "cell.mcap", "rosbag2"):
+        calls = [([options.sysid, "segment", name, "-o", "out"], "segment"),
+                 ([options.sysid, "import", name, "--trajectory", "gripper.tum", "--mesh", "sheet:0.2x0.2:0.05", "-o", "out"], "segment"),
+                 ([options.sysid, "import", "--depth", name, "--trajectory", "gripper.tum", "--mesh", "sheet:0.2x0.2:0.05", "-o", "out"],
+                  "segment")]
+        if options.calib:
+            calls += [([options.calib, verb, name, "--target", "chessboard:9x6:0.025", "-o", "out.json"], "handeye")
+                      for verb in ("handeye", "intrinsics")]
+        for words, reader in calls:
+            yield from refused(options, folder, words, f"{name}: is a recording",
+                               f"python -m flash_sim.bag {name} --for {reader} -o FOLDER")
+
+
 def check_set_up(options, folder):
     """A scene of many vertices is set up with a word of what is done; a small one without."""
     for name, expected in (("slow.json", True), ("short.json", False)):
@@ -484,7 +503,7 @@ def main():
     parser.add_argument("--only", default="", help="checks whose name has this")
     options = parser.parse_args()
     checks = [check_config, check_words, check_units, check_unusable, check_values, check_device, check_layers, check_names, check_help, check_places, check_calibration, check_guess,
-              check_kills, check_digits, check_set_up, check_early_signals]
+              check_kills, check_digits, check_bags, check_set_up, check_early_signals]
     done, failed = 0, 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)

@@ -18,6 +18,7 @@
 #include "data/files/stop.h"
 #include "data/files/text.h"
 #include "data/mesh/mesh_io.h"
+#include "data/recording/bag_file.h"
 #include "data/recording/frame_files.h"
 #include "sysid/capture/clocks.h"
 #include "sysid/capture/segment/cell_check.h"
@@ -329,6 +330,7 @@ void take_lens(const data::CameraPose& pose, const std::string& pose_path, const
 }  // namespace
 
 RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
+  data::expect_no_bag(folder, "segment");
   if (!fs::is_directory(folder))
     throw data::input_error(folder, "folder",
                             fs::exists(folder) ? "is a file, expected a folder" : "does not exist");
