@@ -1,12 +1,14 @@
 #include "apps/command_line/command_line.h"
 
 #include <fcntl.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -41,6 +43,15 @@ void ask_to_stop(int signal) {
   if (stop_asked.exchange(true)) _exit(128 + signal);
   const int before = errno;
   [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kStopping.data(), kStopping.size());
+  errno = before;
+}
+
+constexpr std::string_view kTimeOver = "\nthe time of --max-hours is over: stopping after this step\n";
+
+void stop_as_time_is_over(int /*signal*/) {
+  if (stop_asked.exchange(true)) return;
+  const int before = errno;
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kTimeOver.data(), kTimeOver.size());
   errno = before;
 }
 
@@ -99,6 +110,7 @@ void occupy_closed_streams() {
 
 /// Whether a signal asked to stop. From here on one ends the program at once, as if none were caught.
 bool asked_to_stop_till_now() {
+  std::signal(SIGALRM, SIG_IGN);
   for (const int signal : {SIGINT, SIGTERM}) {
     struct sigaction now = {};
     sigaction(signal, nullptr, &now);
@@ -341,6 +353,19 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
 const std::atomic<bool>& stop_on_signals() {
   handle_signals(ask_to_stop);
   return stop_asked;
+}
+
+void stop_after(double hours) {
+  struct sigaction action = {};
+  action.sa_handler = stop_as_time_is_over;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGALRM, &action, nullptr);
+  constexpr double kLongest = 1e8;  // that timers take [s]
+  const double seconds = std::min(3600 * hours, kLongest), whole = std::floor(seconds);
+  itimerval timer = {};
+  timer.it_value.tv_sec = static_cast<time_t>(whole);
+  timer.it_value.tv_usec = std::max<suseconds_t>(1, static_cast<suseconds_t>(1e6 * (seconds - whole)));
+  setitimer(ITIMER_REAL, &timer, nullptr);
 }
 
 void end_after_signal() {

@@ -30,6 +30,9 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
 /// stops after the step in work. A second signal ends the program there, with the exit code 128 + signal.
 const std::atomic<bool>& stop_on_signals();
 
+/// So many hours from now the flag of stop_on_signals is set, with a line on stderr, as after a signal.
+void stop_after(double hours);
+
 /// Between a computation and the writing of its result: throws data::Stopped after a signal.
 void end_after_signal();
 

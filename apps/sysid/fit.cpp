@@ -33,6 +33,7 @@ struct FitOptions {
   bool no_solver_check = false;
   bool no_horizon = false;
   bool no_plan = false;
+  double max_hours = 0;  ///< 0: without end
   bool resume = false;
   std::string rollouts;
   std::string out;
@@ -89,6 +90,7 @@ void check_out(const FitOptions& options) {
 
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   stop_on_signals();
+  if (options.max_hours > 0) stop_after(options.max_hours);
   check_out(options);
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
@@ -185,6 +187,7 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions; without it, that of the search it starts from");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
+  add_max_hours_option(*verb, options->max_hours);
   verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
   add_replay_options(*verb, options->replay);
   add_device_option(*verb, options->common);

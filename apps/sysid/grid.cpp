@@ -33,6 +33,7 @@ struct GridOptions {
   bool no_solver_check = false;
   bool no_horizon = false;
   bool no_plan = false;
+  double max_hours = 0;   ///< 0: without end
   std::string posterior;  ///< empty: by the number of parameters
   bool resume = false;
   std::string rollouts;
@@ -111,6 +112,7 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
 int run_grid(const CLI::App& verb, const GridOptions& options) {
   const sysid::PosteriorMethod posterior = posterior_method(options.posterior);
   stop_on_signals();
+  if (options.max_hours > 0) stop_after(options.max_hours);
   check_options(options);
   const auto begin = std::chrono::steady_clock::now();
   const std::string grid_file = (fs::path(options.out) / "grid.json").string();
@@ -198,6 +200,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions, for several searches; without it, motions/ of the run");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
+  add_max_hours_option(*verb, options->max_hours);
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);
   add_device_option(*verb, options->common);

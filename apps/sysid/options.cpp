@@ -158,6 +158,11 @@ void add_grasp_cell_option(CLI::App& verb, std::optional<double>& grasp_cell) {
       ->check(number_from(0));
 }
 
+void add_max_hours_option(CLI::App& verb, double& hours) {
+  verb.add_option("--max-hours", hours, "End after so long, with what was simulated kept for --resume [h]")
+      ->check(positive_number());
+}
+
 void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   CLI::App& group = *verb.add_option_group("Replay and score");
   group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");

@@ -46,6 +46,8 @@ struct ReplayOptions {
   std::vector<std::string> shared;
 };
 void add_grasp_cell_option(CLI::App& verb, std::optional<double>& grasp_cell);
+/// Of searches, which keep what they have (stop_after).
+void add_max_hours_option(CLI::App& verb, double& hours);
 void add_replay_options(CLI::App& verb, ReplayOptions& options);
 sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions& options, int threads);
 sysid::ScoreSettings score_settings(const ReplayOptions& options);

@@ -45,6 +45,26 @@ def end(job):
         return "does not end"
 
 
+def ends_in_time(sysid, root, asset, recording):
+    """--max-hours ends a search as a signal does, and the same command goes on; other numbers are refused."""
+    out = root / "in_time"
+    words = [sysid, "grid", recording, "--asset", asset, *AXES, "--resume", "-o", out, "--max-hours"]
+    for last in ("0", "-1", "nan", "soon"):
+        done = program.call(*words, last)
+        expect(done.returncode == 2 and "--max-hours" in done.stderr, f"--max-hours {last}", done.stderr)
+        expect(not out.exists(), f"--max-hours {last}: leaves nothing")
+    done = program.call(*words, "3e-4", *LONG)  # 1 s of some minutes
+    expect(done.returncode == 1, "--max-hours: exit code", f"{done.returncode} {done.stderr}")
+    expect("the time of --max-hours is over" in done.stderr, "--max-hours: says why", done.stderr)
+    expect("kept in" in done.stderr and "--resume goes on" in done.stderr, "--max-hours: what is kept", done.stderr)
+    again = program.call(*words, "3e-4", *LONG)
+    expect(again.returncode == 1 and "other" not in again.stderr, "--max-hours: goes on", again.stderr)
+    shutil.rmtree(out, ignore_errors=True)
+    done = program.call(*words, "1")
+    expect(done.returncode in (0, 3) and "--max-hours" not in done.stderr, "--max-hours that is not reached", done.stderr)
+    shutil.rmtree(out, ignore_errors=True)
+
+
 def stops(sysid, root, asset, recording, run):
     common = ["--asset", asset]
     jobs = {
@@ -73,6 +93,7 @@ def stops(sysid, root, asset, recording, run):
             results = (out / "results.csv").read_text() if out.exists() else ""
             expect(results.count("\n") == 1, "grid: keeps no part of a candidate", results)
             shutil.rmtree(out, ignore_errors=True)
+    ends_in_time(sysid, root, asset, recording)
     # Both signals wait until the job goes on: the second finds that the first has asked already.
     job = start(sysid, "replay", *jobs["replay"], "-o", root / "twice")
     for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):
