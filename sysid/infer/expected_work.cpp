@@ -99,11 +99,12 @@ ExpectedWork expected_work(const std::vector<Replay>& replays, const GridSetting
       solver_check ? on_cells_for_fold(replays, candidate_at(values, grid)) : std::vector<Replay>();
   if (smaller.empty()) return work_on(replays, grid, solver_check);
   const double each = motion_cost(vertices_of(smaller) / vertices_of(replays), 1);
-  ExpectedWork work = work_on(smaller, grid, solver_check);
-  // The first look on the smaller cells has motions of its own.
-  work.first_look = each * (work.first_look + work.lattice);
-  work.lattice *= each;
-  work.end *= each;
+  const ExpectedWork there = work_on(smaller, grid, true);
+  ExpectedWork work = work_on(replays, grid, false);  // the first look, at the motions of the search
+  // One lattice more, which has all errors of the solution.
+  work.lattices = there.lattices + 1;
+  work.lattice = each * (there.lattice + there.first_look / work.lattices);
+  work.end = each * there.end;
   return work;
 }
 

@@ -15,7 +15,8 @@ TEST(ExpectedWork, TheMiddleIsThatOfTheLogarithmsWhereTheseAreSearched) {
             (std::vector<double>{1e-4, 0.35}));
 }
 
-// An answer on smaller cells takes as many motions, each of which is dearer by what its vertices cost.
+// An answer on smaller cells has its own motions, each of which is dearer by what its vertices cost, after a
+// look at those of the search.
 TEST(ExpectedWork, OfAnAnswerOnSmallerCellsIsThatOfItsMotions) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_corner_lift(folder, 0.2)};
@@ -36,10 +37,12 @@ TEST(ExpectedWork, OfAnAnswerOnSmallerCellsIsThatOfItsMotions) {
   const double each = motion_cost(vertices(on[0]) / vertices(replays[0]), 1);
   EXPECT_GT(each, 1);
   const ExpectedWork there = expected_work(on, grid, true, {20 * limp, 0.3});
-  EXPECT_DOUBLE_EQ(smaller.lattice, each * there.lattice);
-  EXPECT_DOUBLE_EQ(smaller.first_look, each * (there.first_look + there.lattice));
+  EXPECT_DOUBLE_EQ(smaller.lattices, there.lattices + 1);
+  EXPECT_DOUBLE_EQ(smaller.lattices * smaller.lattice,
+                   each * (smaller.lattices * there.lattice + there.first_look));
   EXPECT_DOUBLE_EQ(smaller.end, each * there.end);
-  EXPECT_GT(smaller.first_look, own.first_look);
+  EXPECT_DOUBLE_EQ(smaller.first_look, unchecked.first_look);
+  EXPECT_LT(smaller.first_look, own.first_look);
   EXPECT_DOUBLE_EQ(unchecked.lattice, expected_work(replays, grid, false, {20 * limp, 0.3}).lattice);
 }
 
