@@ -188,7 +188,7 @@ def check_words(options, folder):
 
 def check_units(options, folder):
     """Numbers in other units than their fields: one notice with the usual range."""
-    for field, value, *expected in (("areal_density", 150, "areal density found 150 kg/m^2", "0.005 to 20"),
+    for field, value, *expected in (("areal_density", 150, "areal density found 150 kg/m^2", "0.01 to 20"),
                                     ("young", 50, "young with a thickness found 50 Pa", "1000 to 1e+12", "E t in N/m")):
         props = program.ASSET["mechanical_props"] | {field: value}
         (folder / "odd.json").write_text(json.dumps(program.ASSET | {"mechanical_props": props}))
