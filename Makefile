@@ -24,7 +24,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study ridge-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
-.PHONY: studies device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
+.PHONY: studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -122,6 +122,10 @@ few-views-study: configure-test  ## Say whether hand-eye calibration states its 
 knock-study: configure-test  ## Say whether hand-eye calibration sees knocks near either end of a recording, and none where nothing moved
 	cmake --build $(BUILD) -j $(JOBS) --target knock_study
 	$(BUILD)/tests/knock_study
+
+kinhec: configure-test  ## Say how pairs of the public benchmark KinHEC (pip install kinhec) are answered beside its own methods
+	cmake --build $(BUILD) -j $(JOBS) --target flash-calib
+	$(PYTHON) tests/validation/kinhec.py --calib $(BUILD)/bin/flash-calib --size-known --out $(BUILD)/kinhec
 
 ridge-study: configure-test  ## Say whether posteriors on ridges, straight and bent, of 2 to 6 parameters are right, over 200 draws each
 	cmake --build $(BUILD) -j $(JOBS) --target ridge_study
