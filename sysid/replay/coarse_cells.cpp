@@ -58,12 +58,11 @@ std::string mm(double length) { return data::format_short(std::round(1e4 * lengt
 }  // namespace
 
 std::vector<Replay> on_cells_for_fold(const std::vector<Replay>& replays, const ReplayCandidate& candidate) {
-  constexpr double kOfFold = 0.375;
   for (const Replay& replay : replays)
     if (replay.settings.self_contact) return {};
   const auto coarse = coarse_cells(replays, candidate, most_of_fold_of_answer);
   if (!coarse) return {};
-  return on_smaller_cells(replays, std::max(0.5, kOfFold * coarse->radius / coarse->cell));
+  return on_smaller_cells(replays, std::max(0.5, made_for_fold * coarse->radius / coarse->cell));
 }
 
 std::string cells_for_fold_text(const std::vector<Replay>& replays, const std::vector<Replay>& smaller) {

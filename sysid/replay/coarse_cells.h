@@ -22,8 +22,9 @@ struct CoarseCells {
 
 inline constexpr double most_of_fold = 0.5;
 
-/// From this share on an answer has smaller cells (on_cells_for_fold).
-inline constexpr double most_of_fold_of_answer = 0.394;
+/// The share that cells of an answer take where they are made for the fold (on_cells_for_fold), and the one
+/// from which on they are.
+inline constexpr double made_for_fold = 0.375, most_of_fold_of_answer = 1.05 * made_for_fold;
 
 /// Of the first recording in which they take more than `most` of the radius; empty where there is none: cells
 /// are smaller, or there is no table, no weight, no bending or a solid.

@@ -79,7 +79,7 @@ def xyzw(matrix):
 
 
 def quaternion(rotation):
-    """x y z w by the eigenvector of Bar-Itzhack's matrix: another way than that of the program."""
+    """Unit quaternion x y z w of a rotation (3, 3): the eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
     r = rotation
     k = np.array([[r[0, 0] - r[1, 1] - r[2, 2], r[1, 0] + r[0, 1], r[2, 0] + r[0, 2], r[2, 1] - r[1, 2]],
                   [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], r[2, 1] + r[1, 2], r[0, 2] - r[2, 0]],
@@ -166,28 +166,28 @@ def _store(name):
     return store
 
 
-def _write_one(path, entries, prepare):
-    from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores
-    store, connections = _store(Stores.ROS1_NOETIC), {}
-    writer = Writer(path)
-    prepare(writer)
+def _write(writer, store, serialize, entries):
+    """All entries, a connection a topic."""
+    connections = {}
     with writer:
         for topic, kind, time, fields in entries:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], time, store.serialize_ros1(built(store, kind, fields), kind))
+            writer.write(connections[topic], time, serialize(built(store, kind, fields), kind))
+
+
+def _write_one(path, entries, prepare):
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores
+    store, writer = _store(Stores.ROS1_NOETIC), Writer(path)
+    prepare(writer)
+    _write(writer, store, store.serialize_ros1, entries)
     return path
 
 
 def _write_two(path, entries, plugin, prepare):
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores
-    store, connections = _store(Stores.ROS2_HUMBLE), {}
-    writer = Writer(path, version=9, storage_plugin=plugin)
+    store, writer = _store(Stores.ROS2_HUMBLE), Writer(path, version=9, storage_plugin=plugin)
     prepare(writer)
-    with writer:
-        for topic, kind, time, fields in entries:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], time, store.serialize_cdr(built(store, kind, fields), kind))
+    _write(writer, store, store.serialize_cdr, entries)

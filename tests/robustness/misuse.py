@@ -1,19 +1,16 @@
 #!/usr/bin/env python3
 """What people do to the programs: files of options that are none, values out of all range, places that cannot be written,
-calibrations that cannot be used, guesses that are wrong, kills, and signals before anything has begun. Each is answered at
-once and in one line, and what was taken all the same is named wherever it goes."""
+calibrations that cannot be used, and guesses that are wrong. Each is answered at once and in one line, and what was taken
+all the same is named wherever it goes."""
 import argparse
-import fcntl
 import json
 import os
 import pathlib
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
-import time
 
 import program
 from malformed_inputs import CAMERA, png
@@ -381,39 +378,6 @@ def check_guess(options, folder):
     yield "guessed" not in done.stderr, f"a table height that was given: {done.stderr}"
 
 
-def temporary_folders(folder):
-    return sorted(path.name for path in folder.rglob("*-0.tmp") if path.is_dir())
-
-
-def check_kills(options, folder):
-    """What a killed segment leaves beside its output, or in it, the next one removes, but not what others write to."""
-    words = [options.sysid, "segment", folder / "many", "--no-table", "--force", "--quiet", "-o", folder / "kept" / "out"]
-    (folder / "kept").mkdir()
-    for where in ("beside", "in"):  # the first run makes the output
-        job = subprocess.Popen([*map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        while not temporary_folders(folder / "kept") and job.poll() is None:
-            time.sleep(0.001)
-        job.kill()
-        error = job.communicate()[1]
-        yield job.returncode == -signal.SIGKILL, f"segment ended before it was killed: {job.returncode} {error}"
-        foreign = folder / "kept" / "output.2-0.tmp"
-        left = [name for name in temporary_folders(folder / "kept") if name != foreign.name]
-        yield len(left) == 1, f"a killed segment {where}: {left}"
-        held = folder / "kept" / ("out.1-0.tmp" if where == "beside" else "out/.1-0.tmp")
-        for path in (held, foreign):
-            path.mkdir(exist_ok=True)
-        lock = os.open(held, os.O_RDONLY)
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        done = program.call(*words)
-        yield done.returncode == 0, f"segment after a kill: exit code {done.returncode}: {done.stderr}"
-        found = temporary_folders(folder / "kept")
-        yield found == sorted([held.name, foreign.name]), f"after a kill, {where}: {found}"
-        os.close(lock)
-    program.must(*words)
-    yield temporary_folders(folder / "kept") == ["output.2-0.tmp"], f"in the end: {temporary_folders(folder / 'kept')}"
-    shutil.rmtree(folder / "kept")
-
-
 def check_digits(options, folder):
     """Spreads of narrow linear ranges: a uniform range of width w has w / sqrt(12)."""
     done = program.call(options.sysid, "plan", "recording", "--asset", "asset.json", "--poisson", "0.3:0.3001:2",
@@ -463,47 +427,14 @@ def check_set_up(options, folder):
     shutil.rmtree(folder / "set_up")
 
 
-def catches(job):
-    lines = pathlib.Path(f"/proc/{job.pid}/status").read_text().splitlines()
-    return int(dict(line.split(":", 1) for line in lines if ":" in line).get("SigCgt", "0"), 16)
-
-
-def check_early_signals(options, folder):
-    """A signal as soon as the program catches any, before it has read its first file."""
-    search = ["recording", "--asset", "asset.json", "-o", "early"]
-    grid = ["grid", *search, "--bending", "1e-4,2e-4"]
-    jobs = [[options.sysid, *words] for words in
-            (grid, ["replay", *search], ["plan", *search], ["fit", *search, "--start", "run"],
-             ["synth", "--asset", "cloth.json", "--duration", "5", "--mesh", "sheet:0.2x0.2:0.005", "-o", "early"],
-             ["segment", "many", "--no-table", "-o", "early"])]
-    jobs += [[options.sim, "run", "slow.json", "-o", "early"], [options.sim, "bench", "--vertices", "5000"]]
-    for words in jobs:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            job = subprocess.Popen([*map(str, words)], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                                   text=True)
-            while job.poll() is None and not catches(job) & 1 << (number - 1):
-                pass
-            job.send_signal(number)
-            error = job.communicate(timeout=HANG)[1]
-            where = f"{words[1]}, {number.name} at the start"
-            yield job.returncode == FAILED, f"{where}: exit code {job.returncode}: {error}"
-            # On a busy machine the signal may come later: what is left then is named.
-            lines = re.findall(r"^flash-\w+: (?:warning: )?(?:stopped|the signal came) .*$", error, re.MULTILINE)
-            yield len(lines) == 1, f"{where}: says {error}"
-            named = any(word in error for word in ("kept in early", "it is written"))
-            yield not (folder / "early").exists() or named, f"{where}: leaves something: {error}"
-            shutil.rmtree(folder / "early", ignore_errors=True)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+def run_checks(description, what, checks):
+    """Says how many statements of the checks hold, each of (options, folder); the exit code."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--sim", required=True, type=pathlib.Path, help="the program flash-sim")
     parser.add_argument("--sysid", required=True, type=pathlib.Path, help="the program flash-sysid")
     parser.add_argument("--calib", type=pathlib.Path, help="the program flash-calib")
     parser.add_argument("--only", default="", help="checks whose name has this")
     options = parser.parse_args()
-    checks = [check_config, check_words, check_units, check_unusable, check_values, check_device, check_layers, check_names, check_help, check_places, check_calibration, check_guess,
-              check_kills, check_digits, check_bags, check_set_up, check_early_signals]
     done, failed = 0, 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
@@ -517,9 +448,11 @@ def main():
                 failed += not holds
                 if not holds:
                     print(f"{check.__name__}: {complaint}", flush=True)
-    print(f"{done - failed} of {done} statements about misuse hold")
-    sys.exit(1 if failed else 0)
+    print(f"{done - failed} of {done} statements about {what} hold")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run_checks(__doc__, "misuse", [
+        check_config, check_words, check_units, check_unusable, check_values, check_device, check_layers, check_names, check_help,
+        check_places, check_calibration, check_guess, check_digits, check_bags, check_set_up]))

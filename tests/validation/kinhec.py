@@ -8,7 +8,7 @@ over sequences answered. The best baseline of a track is that with the least med
 is unknown (monocular), the size of the target is solved for.
 
     pip install kinhec
-    tests/validation/kinhec.py --calib build/release/bin/flash-calib --tier smoke --out /tmp/kinhec"""
+    tests/validation/kinhec.py --calib build/release/bin/flash-calib --tier smoke --out build/kinhec"""
 import argparse
 import collections
 import json

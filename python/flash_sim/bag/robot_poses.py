@@ -7,7 +7,7 @@ from flash_sim.bag import rigid
 from flash_sim.bag.errors import refusal
 from flash_sim.bag.pictures import frame_of, stamp_of
 from flash_sim.bag.robot_model import robot_model
-from flash_sim.bag.streams import PoseStream, bracket
+from flash_sim.bag.streams import PoseStream, bracket, in_order
 from flash_sim.bag.transforms import TF_KINDS
 
 POSE_KINDS = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/TransformStamped",
@@ -24,11 +24,9 @@ class JointStream:
 
     def __init__(self, source, model, stamps, joints):
         """stamps (n,) [ns], joints (n, len(model.moving)) [rad, m]."""
-        order = np.argsort(np.asarray(stamps, np.int64), kind="stable")
-        times = np.asarray(stamps, np.int64)[order]
-        last = np.append(np.diff(times) > 0, True)
-        self.source, self.times, self._model = source, times[last], model
-        self._joints = np.asarray(joints, np.float64)[order][last]
+        self.source, self._model = source, model
+        self.times, kept = in_order(stamps)
+        self._joints = np.asarray(joints, np.float64)[kept]
 
     def at(self, time):
         """As PoseStream.at."""

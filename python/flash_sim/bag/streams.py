@@ -15,19 +15,24 @@ SAME_STAMP = SECOND // 1000  # nothing moves in between
 DAY = 86400 * SECOND
 
 
+def in_order(stamps):
+    """Times (m,) [ns] in order, and which of the stamps (n,) they are: of equal ones the last."""
+    order = np.argsort(np.asarray(stamps, np.int64), kind="stable")
+    times = np.asarray(stamps, np.int64)[order]
+    last = np.append(np.diff(times) > 0, True)
+    return times[last], order[last]
+
+
 class PoseStream:
     """Poses of one frame in another over time."""
 
     def __init__(self, source, stamps, places, quaternions):
         """source: topic and frames, for messages. stamps (n,) [ns], places (n, 3) [m], quaternions (n, 4) x y z w; they are put in
         order, and of one stamp the last one stays."""
-        order = np.argsort(np.asarray(stamps, np.int64), kind="stable")
-        times = np.asarray(stamps, np.int64)[order]
-        last = np.append(np.diff(times) > 0, True)
         self.source = source
-        self.times = times[last]
-        self._places = np.asarray(places, np.float64)[order][last]
-        self._quaternions = np.asarray(quaternions, np.float64)[order][last]
+        self.times, kept = in_order(stamps)
+        self._places = np.asarray(places, np.float64)[kept]
+        self._quaternions = np.asarray(quaternions, np.float64)[kept]
 
     def at(self, time):
         """The transform (4, 4) at a time and the gap [ns] between the poses about it; None outside of all."""
