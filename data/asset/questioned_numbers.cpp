@@ -19,7 +19,7 @@ std::string questioned(const std::string& source, const std::vector<UsualNumber>
 
 std::string questioned(const Asset& asset, const SheetMaterial& m) {
   constexpr double kSoftest = 1e3, kStiffest = 1e12;  // [Pa]
-  constexpr double kStiff = 1e5;                      // E t, of paper and films [N/m]
+  constexpr double kStiff = 1e5;                      // E t, of cloth [N/m]
   constexpr double kApart = 1e3;  // of D from that of a plate; fibres that slide take a factor of 100
   std::vector<UsualNumber> numbers = {
       {"areal density", m.areal_density, 0.01, 20, "kg/m^2", "", " (150 g/m^2 are 0.15)"}};
@@ -28,7 +28,7 @@ std::string questioned(const Asset& asset, const SheetMaterial& m) {
     numbers.push_back({"young with a thickness", asset.young, kSoftest, kStiffest, "Pa",
                        " (E t in N/m has no thickness beside it)", ""});
     numbers.push_back({"E t", asset.young * *asset.thickness, 0, kStiff, "N/m", "",
-                       " of cloth, paper and films (steps of stiffer sheets take long)"});
+                       " of cloth (paper and plates have more; their steps take long)"});
     if (m.bending_rigidity > 0)
       numbers.push_back({"bending rigidity", m.bending_rigidity, plate / kApart, plate * kApart, "N m",
                          " about that of a plate of this young and thickness",

@@ -74,6 +74,26 @@ std::string stuck_gripper(const std::vector<HeldCloud>& held) {
          ": is the trajectory that of this recording?";
 }
 
+/// Where the cloth is higher than the gripper ever was until then, in three frames or more; empty where it is
+/// not.
+std::string cloth_above_gripper(const data::Recording& recording, const std::vector<HeldCloud>& held) {
+  constexpr int kFewest = 3;
+  double raised = held.front().tool.z(), most = 0;
+  int frames = 0;
+  for (const HeldCloud& cloud : held) {
+    raised = std::max(raised, cloud.tool.z());
+    const double above = cloud.highest + recording.table_point.z() - raised;
+    if (above <= kStretch + recording.nuisance.offset.z()) continue;
+    ++frames;
+    most = std::max(most, above);
+  }
+  if (frames < kFewest) return "";
+  return "the cloth is up to " + metres(most) + " above the highest place of the gripper until then, in " +
+         std::to_string(frames) +
+         " frames: do the times of the frames and the trajectory belong together (--times), or were frames "
+         "lost?";
+}
+
 }  // namespace
 
 std::vector<std::string> contradictions(const data::Recording& recording,
@@ -89,7 +109,9 @@ std::vector<std::string> contradictions(const data::Recording& recording,
   const std::string sheet = metres(size.x()) + " x " + metres(size.y());
 
   std::vector<std::string> found;
-  if (const std::string stuck = stuck_gripper(held); !stuck.empty()) found.push_back(stuck);
+  std::string of_time = stuck_gripper(held);
+  if (of_time.empty()) of_time = cloth_above_gripper(recording, held);
+  if (!of_time.empty()) found.push_back(of_time);
   std::vector<double> nearest, farthest, off_table;
   for (const HeldCloud& cloud : held) {
     nearest.push_back(cloud.nearest);

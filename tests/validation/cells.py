@@ -157,6 +157,12 @@ def kept_frames(cell, draw, folder, declared):
         (folder / "times.csv").write_text("t\n" + "".join(f"{i / 10:.3f}\n" for i in left))
 
 
+def late_frames(cell):
+    """Those of the first half are lost, and the others numbered anew."""
+    lost = len(cell.frames) // 2
+    cell.frames, cell.names = cell.frames[lost:], cell.names[:-lost]
+
+
 def anywhere(draw):
     return about_z(draw.uniform(-math.pi, math.pi)), numpy.array([draw.uniform(-2, 2), draw.uniform(-2, 2), draw.uniform(-0.8, 1.2)])
 
@@ -233,6 +239,7 @@ WRONG = {
     "a gripper in another frame": lambda cell, lens, draw, folder: world_gripper(cell, draw),
     "the flange for the tool": lambda cell, lens, draw, folder: flange(cell, draw),
     "lost frames and a rate": lambda cell, lens, draw, folder: kept_frames(cell, draw, folder, False),
+    "half of the frames lost, numbered anew": lambda cell, lens, draw, folder: late_frames(cell),
     "half a turn of the heading": lambda cell, lens, draw, folder: turned_heading(cell, 180),
     "twice the cloth, off the table": lambda cell, lens, draw, folder: stated_size(cell, 2.0),
     "half the cloth, off the table": lambda cell, lens, draw, folder: stated_size(cell, 0.5),

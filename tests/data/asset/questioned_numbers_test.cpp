@@ -48,9 +48,10 @@ TEST(QuestionedNumbers, OfOtherUnitsAreOneNotice) {
       question({{"areal_density", 6.5}, {"young", 5e6}, {"thickness", 5e-3}, {"bending_rigidity", 0.05}}),
       "");
   // A sheet of steel.
-  EXPECT_EQ(question({{"areal_density", 7.8}, {"young", 2.1e11}, {"bending_rigidity", 18}}),
-            "E t found 2.1e+08 N/m, usually 0 to 1e+05 of cloth, paper and films (steps of stiffer sheets "
-            "take long)");
+  EXPECT_EQ(
+      question({{"areal_density", 7.8}, {"young", 2.1e11}, {"bending_rigidity", 18}}),
+      "E t found 2.1e+08 N/m, usually 0 to 1e+05 of cloth (paper and plates have more; their steps take "
+      "long)");
 }
 
 // A woven cloth bends a hundred times less than its membrane would; a thousand times is another unit.

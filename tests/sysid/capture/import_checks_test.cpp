@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/import_picture.h"
 #include "tests/data/temporary_folder.h"
@@ -86,6 +88,32 @@ TEST(ImportChecks, AGripperThatStandsStillWhileTheClothRisesIsNamed) {
   for (Eigen::Isometry3d& pose : recording.trajectories["gripper"].poses) pose.translation().z() = 0.1;
   EXPECT_TRUE(
       said_of(recording, clouds_of(diagonal, 0.15)).starts_with("the gripper stands still while the cloth"));
+}
+
+// Frames that show a later time than they are given: lost ones before them, numbered anew.
+TEST(ImportChecks, ClothAboveEveryPlaceOfTheGripperIsNamed) {
+  const auto shifted = [](double by) {
+    std::vector<data::Keyframe> keyframes = clouds_of(diagonal, 0.8);
+    for (data::Keyframe& keyframe : keyframes) keyframe.time = std::max(0.0, keyframe.time - by);
+    return said_of(lift_of(0.8), keyframes);
+  };
+  EXPECT_EQ(shifted(0.06), "");  // 48 mm at 0.8 m/s
+  EXPECT_NE(shifted(0.2).find("the cloth is up to 0.1"), std::string::npos) << shifted(0.2);
+  EXPECT_NE(shifted(0.2).find("in 4 frames: do the times of the frames and the trajectory belong together"),
+            std::string::npos)
+      << shifted(0.2);
+  // What is lowered after the lift may fold over the gripper.
+  data::Recording recording = lift_of(0.8);
+  data::Trajectory& trajectory = recording.trajectories["gripper"];
+  std::vector<data::Keyframe> keyframes = clouds_of(diagonal, 0.8);
+  trajectory.times = {0, 1, 2};
+  trajectory.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.1)));
+  for (const double t : {1.7, 1.8, 1.9}) {
+    keyframes.push_back(keyframes[1]);
+    keyframes.back().time = t;
+  }
+  EXPECT_EQ(said_of(recording, keyframes).find("above the highest place"), std::string::npos)
+      << said_of(recording, keyframes);
 }
 
 TEST(ImportChecks, AFlangeForTheToolIsNamed) {
