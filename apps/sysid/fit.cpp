@@ -73,6 +73,19 @@ std::vector<std::string> other_settings(const std::string& start, const sysid::F
   return lines;
 }
 
+// On the cells that a search began with, where its answer is of smaller ones.
+std::vector<sysid::Replay> on_first_cells(const std::vector<data::Recording>& recordings,
+                                          const std::vector<sysid::Replay>& replays) {
+  std::vector<sysid::Replay> first;
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    sysid::ReplaySettings settings = replays[r].settings;
+    settings.cell_scale = 1;
+    first.push_back(replays[r].settings.cell_scale < 1 ? sysid::make_replay(recordings[r], settings)
+                                                       : replays[r]);
+  }
+  return first;
+}
+
 // The folder is free, or --resume goes on with what it holds.
 void check_out(const FitOptions& options) {
   if (options.resume && options.common.force)
@@ -107,13 +120,12 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   replay.element_order = asset.element_order;
   place_simulation(options.common, asset, replay);
-  const bool own_mesh = replay.mesh.empty();
-  if (own_mesh) replay.mesh = sysid::mesh_of(found.summary);
   std::vector<sysid::Replay> replays;
   std::vector<std::string> names;
   for (const data::Recording& recording : recordings) {
-    replays.push_back(sysid::make_replay(recording, replay));
-    if (own_mesh) check_size(replays.back(), recording, options.start);
+    sysid::ReplaySettings here = replay;
+    if (replay.mesh.empty()) take_mesh(found.summary, options.start, recording, here);
+    replays.push_back(sysid::make_replay(recording, here));
     names.push_back(recording.name);
   }
   if (replay.self_contact) sysid::on_half_the_cell(replays);  // refused before anything is simulated
@@ -134,9 +146,12 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   sysid::check_job(replays, sysid::count_candidates(grid.axes),
                    sysid::estimate_memory(replays, grid, asked.solver_check));
   for (const std::string& notice : notices) say(options.common, notice);
-  tell_known_before(options.common, replays, sysid::held_at(start.values, grid));
+  tell_known_before(options.common, replays, sysid::held_at(start.values, grid),
+                    asked.solver_check ? sysid::Coming::answer : sysid::Coming::search);
   // Before the long part. Axes, which that part finds, are not compared.
-  for (const std::string& line : other_settings(options.start, sysid::fingerprint(replays, grid))) warn(line);
+  for (const std::string& line :
+       other_settings(options.start, sysid::fingerprint(on_first_cells(recordings, replays), grid)))
+    warn(line);
   asked.ranges = grid.axes;
   const std::string grid_file = (fs::path(options.out) / "grid.json").string();
   double candidate_seconds = 0;

@@ -154,7 +154,8 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   if (options.resume && !goes_on)
     say(options.common, options.out + ": holds no search yet, --resume begins one");
   for (const std::string& notice : notices) say(options.common, notice);
-  tell_known_before(options.common, replays, settings);
+  tell_known_before(options.common, replays, settings,
+                    options.no_solver_check ? sysid::Coming::search : sysid::Coming::answer);
   say(options.common,
       data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) + " candidates, " +
           data::format_count(static_cast<std::size_t>(replays.front().sheet().rest.vertices.rows())) +

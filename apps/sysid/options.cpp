@@ -345,8 +345,8 @@ void warn_of_seams(const data::Recording& recording) {
 }
 
 void tell_known_before(const CommonOptions& options, const std::vector<sysid::Replay>& replays,
-                       const sysid::GridSettings& settings) {
-  const sysid::KnownBefore known = sysid::known_before(replays, settings);
+                       const sysid::GridSettings& settings, sysid::Coming coming) {
+  const sysid::KnownBefore known = sysid::known_before(replays, settings, coming);
   for (const std::string& warning : known.warnings) warn(warning);
   for (const std::string& notice : known.notices) say(options, notice);
 }

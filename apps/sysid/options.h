@@ -7,6 +7,7 @@
 #include "data/asset/asset.h"
 #include "sim/device.h"
 #include "sysid/emulate/grid_search.h"
+#include "sysid/emulate/search_warnings.h"
 #include "sysid/replay/replay.h"
 
 namespace flash {
@@ -122,6 +123,6 @@ sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sh
 
 /// Says what is known before a search and makes its answer worse.
 void tell_known_before(const CommonOptions& options, const std::vector<sysid::Replay>& replays,
-                       const sysid::GridSettings& settings);
+                       const sysid::GridSettings& settings, sysid::Coming coming);
 
 }  // namespace flash

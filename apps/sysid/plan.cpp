@@ -115,15 +115,9 @@ void check_options(const CLI::App& verb, const PlanOptions& options) {
 }
 
 // What a search left to be known is of its object.
-void check_cloth(const sysid::SearchFolder& found, const PlanOptions& options,
-                 const std::vector<data::Recording>& recordings, const sysid::ReplaySettings& settings,
-                 const sysid::GridSettings& grid) {
-  sysid::ReplaySettings of_search = settings;
-  of_search.mesh = sysid::mesh_of(found.summary);
-  for (const data::Recording& recording : recordings)
-    check_size(sysid::make_replay(recording, of_search), recording, options.run);
-  if (options.asset.empty()) return;
-  const std::vector<sysid::Replay> replays = {sysid::make_replay(recordings.front(), settings)};
+void check_asset(const PlanOptions& options, const data::Recording& recording,
+                 const sysid::ReplaySettings& settings, const sysid::GridSettings& grid) {
+  const std::vector<sysid::Replay> replays = {sysid::make_replay(recording, settings)};
   for (const std::string& line : unlike_the_asset_of(options.run, sysid::fingerprint(replays, grid)))
     warn("--asset: " + line);
 }
@@ -144,8 +138,12 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   check_kind(asset, recordings.front());
   check_options(options.replay, asset, recordings);
   const sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
-  if (!replay.mesh.empty()) {
-    sysid::ReplaySettings plain = replay;
+  std::vector<sysid::ReplaySettings> simulated(recordings.size(), replay);
+  if (found && replay.mesh.empty())
+    for (std::size_t r = 0; r < recordings.size(); ++r)
+      take_mesh(found->summary, options.run, recordings[r], simulated[r]);
+  if (!simulated.front().mesh.empty() || simulated.front().cell_scale < 1) {
+    sysid::ReplaySettings plain = simulated.front();
     plain.grasp_cell = 0;  // what is simulated is graded towards grasps of its own
     recordings.front() = sysid::make_replay(recordings.front(), plain).recording;
   }
@@ -172,7 +170,7 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     sysid::start_plan(*found, settings);
   }
   data::check_file_free(options.out, options.common.force);
-  if (found) check_cloth(*found, options, recordings, replay, settings.grid);
+  if (found && !options.asset.empty()) check_asset(options, recordings.front(), replay, settings.grid);
   // Refused before anything is simulated.
   sysid::steps_in(sysid::longest_virtual_experiment, options.replay.time_step);
 
@@ -186,13 +184,14 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   }
   const sysid::MotionStore* const kept = store ? &*store : nullptr;
   std::vector<sysid::PlannedExperiment> experiments;
-  for (const data::Recording& recording : recordings) {
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
     const std::vector<sysid::Replay> replays = {
-        sysid::make_replay(data::load_recording(recording.source), replay)};
-    tell_known_before(options.common, replays, sysid::held_at(settings.at, settings.grid));
+        sysid::make_replay(data::load_recording(recordings[r].source), simulated[r])};
+    tell_known_before(options.common, replays, sysid::held_at(settings.at, settings.grid),
+                      sysid::Coming::estimate);
     const std::size_t batch = 2 * settings.at.size() + 1;
     sysid::check_job(replays, static_cast<double>(batch), sysid::estimate_batch(replays, batch));
-    experiments.push_back(sysid::plan_experiment(recording.name, replays, settings, kept));
+    experiments.push_back(sysid::plan_experiment(recordings[r].name, replays, settings, kept));
   }
   for (const char* kind : sysid::virtual_experiments) {
     say(options.common, std::string("simulating ") + kind);

@@ -166,11 +166,9 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
   simulated.element_order = asset.element_order;
   place_simulation(options.common, asset, simulated);
-  const bool own_mesh = simulated.mesh.empty();
-  if (own_mesh) simulated.mesh = sysid::mesh_of(found.summary);
+  if (simulated.mesh.empty()) take_mesh(found.summary, options.run, recording, simulated);
   std::vector<sysid::Replay> replays = {sysid::make_replay(recording, simulated)};
   const sysid::Replay& replay = replays.front();
-  if (own_mesh) check_size(replay, recording, options.run);
   warn_of_other_settings(found.summary, options.replay);
   std::vector<std::string> notices;
   found.grid.base = material_base(asset, replay.sheet(), notices, found.grid.fixed);
@@ -184,7 +182,8 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
     if (used.sha256 == data::recording_sha256(recording))
       warn(recording.name + " is a recording that the search used: nothing is predicted");
   for (const std::string& warning : found.summary.warnings) say(options.common, "the search: " + warning);
-  tell_known_before(options.common, replays, sysid::held_at(found.values.front(), found.grid));
+  tell_known_before(options.common, replays, sysid::held_at(found.values.front(), found.grid),
+                    sysid::Coming::estimate);
 
   std::vector<sysid::ReplayCandidate> candidates;
   for (std::size_t i = 0; i < found.values.size(); ++i)

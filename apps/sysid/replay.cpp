@@ -102,18 +102,6 @@ void keep_predictable(const sysid::IdentifiedRecording& identified, const Common
                     " keyframes do not count; --no-horizon keeps them");
 }
 
-/// Whether a specification is not the recording's, but of a sheet as large: the mesh of a search is that of
-/// its first recording.
-bool is_another_mesh_of(const data::Recording& recording, const std::string& mesh) {
-  constexpr double kSame = 0.01;
-  if (mesh == recording.mesh_spec || !data::is_made_on_the_spot(mesh) || recording.is_solid()) return false;
-  const auto sides = [](const data::Points& vertices) -> Eigen::RowVector3d {
-    return vertices.colwise().maxCoeff() - vertices.colwise().minCoeff();
-  };
-  const Eigen::RowVector3d here = sides(recording.mesh.vertices);
-  return (sides(data::parse_mesh_spec(mesh, "mesh", "").vertices) - here).norm() <= kSame * here.norm();
-}
-
 bool is_of_material(const std::vector<sysid::Axis>& axes) {
   for (const sysid::Axis& axis : axes)
     for (const sysid::Parameter& info : sysid::known_parameters())
@@ -160,12 +148,16 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   simulated.element_order = asset.element_order;
   const std::optional<sysid::IdentifiedRecording> identified =
       sysid::identified_recording(asset, data::recording_sha256(recording));
-  if (identified && simulated.mesh.empty() && is_another_mesh_of(recording, identified->mesh)) {
-    simulated.mesh = identified->mesh;
-    say(options.common, recording.name + ": the mesh is " + identified->mesh +
-                            ", that of the answer behind the asset; --mesh replaces that");
+  const bool as_answered = identified && simulated.mesh.empty();
+  if (as_answered) {
+    simulated.mesh = identified->mesh.mesh;
+    simulated.cell_scale = identified->mesh.cell_scale;
   }
   sysid::Replay replay = sysid::make_replay(recording, simulated);
+  if (as_answered && (simulated.cell_scale < 1 || replay.recording.mesh_spec != recording.mesh_spec))
+    say(options.common, recording.name + ": the mesh is " +
+                            sysid::settings_texts({replay}, sysid::GridSettings{}).at("mesh") +
+                            ", that of the answer behind the asset; --mesh replaces that");
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;

@@ -73,6 +73,9 @@ std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecord
     std::snprintf(number, sizeof number, "%.2f mm", 1000 * recording.score_on_mesh);
     on_mesh = ", " + std::string(number) + " on the mesh of the answer";
   }
+  // The setting names the mesh of the first recording.
+  const bool is_named =
+      recording.score_on_mesh != recording.score || recording.mesh == summary.recordings.front().mesh;
   const std::string observed = setting("observed");
   const bool of_markers = observed == "markers" && recording.markers;
   std::snprintf(number, sizeof number, "%.2f mm",
@@ -81,7 +84,7 @@ std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecord
          (of_markers            ? " from the markers, root mean square"
           : observed == "cloud" ? " from the observed points"
                                 : " over " + observed) +
-         ", on " + setting("score_of") + on_mesh;
+         ", on " + (is_named ? setting("score_of") : "the mesh of the answer") + on_mesh;
 }
 
 void print_solver_check(const sysid::Summary& summary) {

@@ -10,16 +10,11 @@
 
 namespace flash {
 
-void check_size(const sysid::Replay& replay, const data::Recording& recording, const std::string& run) {
-  const auto extent = [](const data::Points& vertices) {
-    return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
-  };
-  const double searched = extent(replay.recording.mesh.vertices), here = extent(recording.mesh.vertices);
-  if (std::abs(searched - here) > 0.02 * here)
-    throw data::input_error(recording.source, "object.mesh",
-                            "found an object " + data::format_short(here) + " m across, that of " + run +
-                                " is " + data::format_short(searched) +
-                                " m: give --mesh where both are of the same material");
+void take_mesh(const sysid::Summary& search, const std::string& run, const data::Recording& recording,
+               sysid::ReplaySettings& settings) {
+  const sysid::SearchedMesh searched = sysid::searched_mesh(search, run, recording);
+  settings.mesh = searched.mesh;
+  settings.cell_scale = searched.cell_scale;
 }
 
 std::vector<std::string> unlike_the_asset_of(const std::string& run, const sysid::Fingerprint& print) {

@@ -30,10 +30,13 @@ std::string digest_of(const std::vector<std::string>& paths) {
 }  // namespace
 
 std::string recording_sha256(const Recording& recording) {
+  return recording_sha256(recording, recording.mesh_spec);
+}
+
+std::string recording_sha256(const Recording& recording, const std::string& mesh) {
   std::vector<std::string> paths = {recording.source};
   for (const auto& [name, path] : recording.trajectory_paths) paths.push_back(path);
-  if (!recording.mesh_spec.empty() && !is_made_on_the_spot(recording.mesh_spec))
-    paths.push_back(recording.mesh_spec);
+  if (!mesh.empty() && !is_made_on_the_spot(mesh)) paths.push_back(mesh);
   if (!recording.start_mesh.empty()) paths.push_back(recording.start_mesh);
   if (recording.camera && !recording.camera->intrinsics_path.empty())
     paths.push_back(recording.camera->intrinsics_path);

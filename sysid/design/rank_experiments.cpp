@@ -6,7 +6,7 @@
 #include "data/files/error.h"
 #include "data/mesh/procedural_mesh.h"
 #include "sysid/design/virtual_experiment.h"
-#include "sysid/replay/half_cell.h"
+#include "sysid/replay/replay_mesh.h"
 
 namespace flash::sysid {
 namespace {

@@ -47,20 +47,28 @@ ReplayCandidate extreme_candidate(const GridSettings& settings, bool limpest) {
 
 constexpr double most_on_halves = 2 * most_of_fold;  // of the fold, where half the cells are coarse too
 
-std::string coarse_text(const Replay& replay, const ReplayCandidate& limpest) {
-  const auto below = [&](double most) {
-    return "below " + data::format_short(coarse_below(replay, limpest, most)) + " N m";
-  };
-  const std::string cells = replay.recording.name + ": cells of " + mm(typical_cell(replay.recording.mesh)) +
-                            " are coarse for the fold in which the sheet leaves the table where bending is ",
-                    off = " it may be off by a few percent more than is said of it",
-                    searched =
-                        ", and " + data::format_short(limpest.material.bending_rigidity) + " N m is searched";
-  if (replay.settings.self_contact) return cells + below(most_of_fold) + searched + ": there" + off;
-  return cells + below(most_of_fold_of_answer) + searched +
-         ": an answer there is simulated on smaller cells, down to half of these, unless --no-solver-check "
-         "is given. " +
-         "Bending " + below(most_on_halves) + ":" + off;
+/// Whether cells that are coarse for the fold are halved for what comes.
+bool are_halved(const Replay& replay, Coming coming) {
+  return coming == Coming::answer && !replay.settings.self_contact;
+}
+
+/// Of candidates from the limpest on; empty where they bend in folds that the cells resolve.
+std::string coarse_text(const Replay& replay, const ReplayCandidate& limpest, Coming coming) {
+  const bool halved = are_halved(replay, coming);
+  const double bending = limpest.material.bending_rigidity,
+               first = coarse_below(replay, limpest, halved ? most_of_fold_of_answer : most_of_fold),
+               last = coarse_below(replay, limpest, halved ? most_on_halves : most_of_fold);
+  if (!(bending < first)) return "";
+  const auto below = [](double rigidity) { return "below " + data::format_short(rigidity) + " N m"; };
+  std::string text = replay.recording.name + ": cells of " + mm(typical_cell(replay.recording.mesh)) +
+                     " are coarse for the fold in which the sheet leaves the table where bending is " +
+                     below(first) + ", and " + data::format_short(bending) + " N m is " +
+                     (coming == Coming::estimate ? "the estimate" : "searched");
+  if (halved) text += ": an answer there is simulated on smaller cells, down to half of these";
+  if (bending < last)
+    text += (halved ? ". Bending " + below(last) + ": it" : ": there it") +
+            " may be off by a few percent more than is said of it";
+  return text;
 }
 
 }  // namespace
@@ -91,17 +99,16 @@ std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) 
   return warnings;
 }
 
-KnownBefore known_before(const std::vector<Replay>& replays, const GridSettings& settings) {
+KnownBefore known_before(const std::vector<Replay>& replays, const GridSettings& settings, Coming coming) {
   KnownBefore known{warnings_of_grasps(replays), {}};
   if (settings.base.solid) return known;
   const ReplayCandidate limpest = limpest_candidate(settings), stiffest = extreme_candidate(settings, false);
   for (const Replay& replay : replays) {
-    const bool layers = replay.settings.self_contact.has_value();
-    const double first = layers ? most_of_fold : most_of_fold_of_answer,
-                 last = layers ? most_of_fold : most_on_halves;
-    if (!(limpest.material.bending_rigidity < coarse_below(replay, limpest, first))) continue;
+    const std::string text = coarse_text(replay, limpest, coming);
+    if (text.empty()) continue;
+    const double last = are_halved(replay, coming) ? most_on_halves : most_of_fold;
     const bool all = stiffest.material.bending_rigidity < coarse_below(replay, stiffest, last);
-    (all ? known.warnings : known.notices).push_back(coarse_text(replay, limpest));
+    (all ? known.warnings : known.notices).push_back(text);
   }
   return known;
 }

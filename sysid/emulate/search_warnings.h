@@ -20,9 +20,16 @@ struct KnownBefore {
   std::vector<std::string> notices;   ///< of a part of the searched range
 };
 
+/// What is simulated next.
+enum class Coming {
+  answer,   ///< of a search, on smaller cells where these are coarse
+  search,   ///< on these cells alone
+  estimate  ///< of an earlier search
+};
+
 /// Each a line, with the option that mends it: warnings_of_grasps, and cells that are coarse for the fold of
 /// the sheet (coarse_cells.h).
-KnownBefore known_before(const std::vector<Replay>& replays, const GridSettings& settings);
+KnownBefore known_before(const std::vector<Replay>& replays, const GridSettings& settings, Coming coming);
 
 /// A search of one value an axis, as one that goes on from an estimate begins.
 GridSettings held_at(const std::vector<double>& values, GridSettings settings);

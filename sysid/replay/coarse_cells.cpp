@@ -53,6 +53,8 @@ std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays, cons
 
 namespace {
 
+constexpr double kLeast = 0.5;  // of the cells of the search: those of an answer
+
 std::string mm(double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; }
 
 }  // namespace
@@ -62,7 +64,18 @@ std::vector<Replay> on_cells_for_fold(const std::vector<Replay>& replays, const 
     if (replay.settings.self_contact) return {};
   const auto coarse = coarse_cells(replays, candidate, most_of_fold_of_answer);
   if (!coarse) return {};
-  return on_smaller_cells(replays, std::max(0.5, made_for_fold * coarse->radius / coarse->cell));
+  // Cells that shrink towards a grasp take less of a sheet, the smaller the others are: the typical one does
+  // not fall by the factor.
+  constexpr int kTries = 4;
+  double factor = std::max(kLeast, made_for_fold * coarse->radius / coarse->cell);
+  std::vector<Replay> smaller = on_smaller_cells(replays, factor);
+  for (int k = 1; k < kTries && factor > kLeast; ++k) {
+    const auto still = coarse_cells(smaller, candidate, most_of_fold_of_answer);
+    if (!still) break;
+    factor = std::max(kLeast, factor * made_for_fold * still->radius / still->cell);
+    smaller = on_smaller_cells(replays, factor);
+  }
+  return smaller;
 }
 
 std::string cells_for_fold_text(const std::vector<Replay>& replays, const std::vector<Replay>& smaller) {

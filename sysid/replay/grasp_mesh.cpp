@@ -217,7 +217,9 @@ std::vector<data::Outline> grasp_outlines(const data::Recording& recording, cons
       if (grasp.select.corner || grasp.select.position) size = std::min(size, within);
       if (outlines.back().corners.empty() && !grasp.select.position) finer = kStraight;
     }
-    outlines.back().near = settings.grasp_cell.value_or(grasp.cell > 0 ? grasp.cell : size / finer);
+    outlines.back().near = settings.grasp_cell ? settings.cell_scale * *settings.grasp_cell
+                           : grasp.cell > 0    ? grasp.cell
+                                               : size / finer;
     outlines.back().near_corner = outlines.back().near / kFinest;
   }
   return outlines;

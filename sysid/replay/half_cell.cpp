@@ -5,11 +5,10 @@
 #include <set>
 #include <utility>
 
-#include "data/files/text.h"
 #include "data/mesh/halved_tets.h"
-#include "data/mesh/procedural_mesh.h"
 #include "data/mesh/tet_faces.h"
 #include "sysid/replay/grasp_mesh.h"
+#include "sysid/replay/replay_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -38,17 +37,6 @@ data::Recording with_halved_tets(const data::Recording& recording) {
 
 }  // namespace
 
-std::string scaled_cell(const std::string& specification, double factor) {
-  if (!data::is_made_on_the_spot(specification)) return "";
-  const std::vector<std::string_view> words = data::split(specification, ":");
-  const auto cell = words.size() >= 3 ? data::parse_number(words[2]) : std::nullopt;
-  if (!cell || (words[0] != "sheet" && words[0] != "box")) return "";
-  std::string scaled =
-      std::string(words[0]) + ":" + std::string(words[1]) + ":" + data::format_number(factor * *cell);
-  for (std::size_t k = 3; k < words.size(); ++k) scaled += ":" + std::string(words[k]);
-  return scaled;
-}
-
 Replay on_half_the_cell(const Replay& replay) {
   ReplaySettings settings = replay.settings;
   if (are_graded(replay.recording, settings)) {
@@ -56,9 +44,10 @@ Replay on_half_the_cell(const Replay& replay) {
     refine_grasps(settings, 0.25, finer);
     return on_mesh(replay, std::move(finer), settings);
   }
-  settings.mesh = scaled_cell(replay.recording.mesh_spec, 0.5);
-  if (!settings.mesh.empty() && replay.recording.start_mesh.empty()) return make_replay(replay, settings);
-  settings.mesh = replay.settings.mesh;
+  if (takes_any_cell(replay.recording)) {
+    settings.cell_scale *= 0.5;
+    return make_replay(replay, settings);
+  }
   data::Recording finer = replay.recording.is_solid() ? with_halved_tets(replay.recording) : replay.recording;
   if (!finer.is_solid()) halve_cells(finer);
   return on_mesh(replay, std::move(finer), settings);
@@ -73,21 +62,13 @@ std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays) {
 }
 
 std::vector<Replay> on_smaller_cells(const std::vector<Replay>& replays, double factor) {
+  const bool any = std::all_of(replays.begin(), replays.end(),
+                               [](const Replay& replay) { return takes_any_cell(replay.recording); });
   std::vector<Replay> smaller;
   for (const Replay& replay : replays) {
     ReplaySettings settings = replay.settings;
-    settings.mesh = scaled_cell(replay.recording.mesh_spec, factor);
-    const bool anew = !settings.mesh.empty() && replay.recording.start_mesh.empty();
-    if (settings.grasp_cell) *settings.grasp_cell *= anew ? factor : 0.5;
-    if (anew) {
-      smaller.push_back(make_replay(replay, settings));
-      continue;
-    }
-    settings.mesh = replay.settings.mesh;
-    data::Recording halves = replay.recording;
-    halve_cells(halves);
-    for (data::RecordedGrasp& grasp : halves.grasps) grasp.cell *= 0.5;
-    smaller.push_back(on_mesh(replay, std::move(halves), settings));
+    settings.cell_scale *= any ? factor : 0.5;
+    smaller.push_back(make_replay(replay, settings));
   }
   return smaller;
 }

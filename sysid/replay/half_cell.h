@@ -7,10 +7,6 @@
 
 namespace flash::sysid {
 
-/// "sheet:0.4x0.4:0.02[:pattern]" or "box:0.1x0.03x0.03:0.01" with its cell times a factor; empty for
-/// anything else.
-std::string scaled_cell(const std::string& specification, double factor);
-
 /// The same recording on cells of half the size, keyframes weighing as they do: meshed anew by its
 /// specification, or the tetrahedra of a file split. Empty for a sheet from a file, and in a shape of its
 /// own.
@@ -18,8 +14,8 @@ Replay on_half_the_cell(const Replay& replay);
 
 std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays);
 
-/// The same recordings on smaller cells, those at the grasps smaller by as much: meshed anew by their
-/// specification with its cell times the factor, or all cells of a file halved.
+/// The same recordings on smaller cells, those at the grasps smaller by as much: their cell_scale times the
+/// factor, or halved where one of them does not take any cell.
 std::vector<Replay> on_smaller_cells(const std::vector<Replay>& replays, double factor);
 
 /// Replays before and after all cells that are not at the grasps were halved: those at the grasps have the

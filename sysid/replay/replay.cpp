@@ -17,7 +17,7 @@
 #include "sim/scene/solid.h"
 #include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/recorded_grasp.h"
-#include "sysid/replay/recorded_mesh.h"
+#include "sysid/replay/replay_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -170,8 +170,7 @@ Replay assemble(data::Recording recording_on_mesh, const ReplaySettings& setting
 Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan) {
   data::Recording on_mesh = recording;
-  if (!settings.mesh.empty()) replace_mesh(settings.mesh, on_mesh);
-  grade_towards_grasps(settings, on_mesh);
+  mesh_as_set(settings, on_mesh);
   return assemble(std::move(on_mesh), settings, recording.mesh_spec, std::move(plan), [&](Replay& replay) {
     for (const data::Keyframe& keyframe : data::load_keyframes(recording, replay.notices)) {
       Observation observation{.t = keyframe.time,
@@ -210,10 +209,7 @@ Replay on_mesh(const Replay& replay, data::Recording recording, const ReplaySett
 Replay make_replay(const Replay& replay, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan) {
   data::Recording recording = replay.recording;
-  if (settings.mesh != replay.settings.mesh) {
-    replace_mesh(settings.mesh.empty() ? replay.object_mesh : settings.mesh, recording);
-    grade_towards_grasps(settings, recording);
-  }
+  mesh_anew(replay, settings, recording);
   return on_mesh(replay, std::move(recording), settings, std::move(plan));
 }
 

@@ -17,7 +17,8 @@ namespace flash::sysid {
 /// What every candidate of a replay has in common.
 struct ReplaySettings {
   sim::SolverSettings solver;
-  std::string mesh;  ///< mesh specification or file in place of the recording's; empty: the recording's
+  std::string mesh;       ///< mesh specification or file in place of the recording's; empty: the recording's
+  double cell_scale = 1;  ///< of its cells and those at the grasps, at most 1 (replay_mesh.h)
   /// Edge length of the cells at each grasp [m]; absent: a fifth of those of the mesh or of the patch, where
   /// the mesh names no pattern of its own; 0: the mesh as it is.
   std::optional<double> grasp_cell;
@@ -109,8 +110,9 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
 Replay on_mesh(const Replay& replay, data::Recording recording, const ReplaySettings& settings,
                std::shared_ptr<const sim::SheetPlan> plan = nullptr);
 
-/// The recording of a replay under other settings, on the same mesh unless settings.mesh changes. What was
-/// observed is taken over with its weights; no file is read but that of another mesh.
+/// The recording of a replay under other settings, on the same mesh unless settings.mesh or
+/// settings.cell_scale changes. What was observed is taken over with its weights; no file is read but that of
+/// another mesh.
 Replay make_replay(const Replay& replay, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan = nullptr);
 

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "data/files/text.h"
-#include "sysid/report/summary.h"
 
 namespace flash::sysid {
 namespace {
@@ -13,6 +12,12 @@ std::optional<double> number_of(const nlohmann::json& object, const char* name) 
   const auto found = object.find(name);
   if (found == object.end() || !found->is_number()) return std::nullopt;
   return found->get<double>();
+}
+
+std::optional<std::string> text_of(const nlohmann::json& object, const char* name) {
+  const auto found = object.find(name);
+  if (found == object.end() || !found->is_string()) return std::nullopt;
+  return found->get<std::string>();
 }
 
 }  // namespace
@@ -26,9 +31,9 @@ std::optional<IdentifiedRecording> identified_recording(const data::Asset& asset
     if (!recording.is_object() || recording.value("sha256", nlohmann::json()) != sha256) continue;
     IdentifiedRecording found{number_of(recording, "horizon_s"), number_of(recording, "score_m"),
                               number_of(recording, "grasp_size_m")};
-    if (const nlohmann::json solver = of("solver"); solver.is_object() && solver.contains("mesh"))
-      if (const nlohmann::json& mesh = solver["mesh"]; mesh.is_string())
-        found.mesh = mesh_of_text(mesh.get<std::string>());
+    found.mesh.mesh = text_of(recording, "mesh").value_or("");
+    if (const nlohmann::json solver = of("solver"); solver.is_object())
+      found.mesh.cell_scale = cell_scale_of(text_of(solver, "cell_scale"), "identification.solver");
     if (recordings.size() == 1) {  // earlier programs kept what all have in common
       if (!found.horizon_s) found.horizon_s = number_of(identification, "horizon_s");
       if (!found.score) found.score = number_of(identification, "score_m");

@@ -9,6 +9,7 @@
 #include "data/files/text.h"
 #include "data/mesh/procedural_mesh.h"
 #include "sysid/replay/recorded_grasp.h"
+#include "sysid/replay/replay_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -57,6 +58,11 @@ std::string grasp_shapes(const std::vector<Replay>& replays) {
   return shapes;
 }
 
+/// A mesh, of which a file is named by its absolute path.
+std::string wherever(const std::string& mesh) {
+  return data::is_made_on_the_spot(mesh) ? mesh : std::filesystem::absolute(mesh).lexically_normal().string();
+}
+
 bool describes_recording(const std::string& name) {
   const Parameter* const found = find_parameter(name);
   return found != nullptr && !found->material;
@@ -82,12 +88,13 @@ std::map<std::string, std::string> settings_texts(const std::vector<Replay>& rep
                                                   const GridSettings& settings) {
   const Replay& replay = replays.front();
   std::map<std::string, std::string> texts;
-  texts["mesh"] = replay.recording.mesh_spec + " (" +
+  const double scale = replay.settings.cell_scale;
+  if (scale < 1) texts["cell_scale"] = data::format_number(scale);
+  texts["mesh"] = wherever(replay.recording.mesh_spec) +
+                  (scale < 1 && !takes_any_cell(replay.recording) ? ", its cells halved (" : " (") +
                   data::format_count(static_cast<std::size_t>(replay.sheet().rest.vertices.rows())) +
                   " vertices)";
-  texts["object_mesh"] = data::is_made_on_the_spot(replay.object_mesh)
-                             ? replay.object_mesh
-                             : std::filesystem::absolute(replay.object_mesh).lexically_normal().string();
+  texts["object_mesh"] = wherever(replay.object_mesh);
   if (const auto& solid = settings.base.solid) {
     texts["element_type"] = "TETRAHEDRON";
     texts["element_order"] = replay.settings.element_order == data::ElementOrder::quadratic ? "2" : "1";

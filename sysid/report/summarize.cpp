@@ -10,6 +10,7 @@
 #include "sysid/emulate/search_warnings.h"
 #include "sysid/infer/held.h"
 #include "sysid/observe/registration_parameter.h"
+#include "sysid/report/searched_mesh.h"
 #include "sysid/report/settings_texts.h"
 
 namespace flash::sysid {
@@ -59,7 +60,9 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
                                      const std::map<std::string, double>& nuisance) {
   SummaryRecording recording;
   recording.name = replay.recording.name;
-  recording.sha256 = data::recording_sha256(replay.recording);
+  recording.sha256 = data::recording_sha256(replay.recording, replay.object_mesh);
+  recording.mesh = named_mesh(replay);
+  recording.own_mesh = replay.settings.mesh.empty();
   recording.offset = score.offset;
   recording.yaw = score.yaw;
   recording.time_offset = score.time_offset;

@@ -53,6 +53,10 @@ Json to_json(const SummaryRecording& recording) {
   Json json;
   json["name"] = recording.name;
   json["sha256"] = recording.sha256;
+  if (!recording.mesh.empty()) {
+    json["mesh"] = recording.mesh;
+    json["own_mesh"] = recording.own_mesh;
+  }
   json["offset"] = {recording.offset.x(), recording.offset.y(), recording.offset.z()};
   json["yaw"] = recording.yaw;
   json["time_offset"] = recording.time_offset;
@@ -159,10 +163,12 @@ SummaryRecording read_recording(const data::JsonObject& json) {
                       "misfit_reach_s", "misfit_reach_m",  "misfit_gain",  "model_fits",
                       "keyframes",      "keyframes_worth", "markers",      "horizon_s",
                       "frames",         "misfit_draws",    "error_cost",   "spread_m",
-                      "score_on_mesh",  "horizon_of"});
+                      "score_on_mesh",  "horizon_of",      "mesh",         "own_mesh"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
+  recording.mesh = json.string("mesh", "");
+  recording.own_mesh = json.boolean("own_mesh", false);
   recording.offset = json.vector("offset", 3);
   recording.yaw = json.number("yaw");
   recording.time_offset = json.number("time_offset");
@@ -248,13 +254,6 @@ double duration_of(const SummaryRecording& recording) {
   }
   return std::max(0.0, last - first);
 }
-
-std::string mesh_of(const Summary& summary) {
-  const auto mesh = summary.settings.find("mesh");
-  return mesh == summary.settings.end() ? "" : mesh_of_text(mesh->second);
-}
-
-std::string mesh_of_text(const std::string& text) { return text.substr(0, text.rfind(" (")); }
 
 bool model_fits(const SummaryRecording& recording) {
   constexpr double kTold = 1e-5;  // [m]

@@ -30,7 +30,9 @@ struct SummaryFrame {
 /// How the estimate fits one recording, and the nuisance values found for it.
 struct SummaryRecording {
   std::string name;
-  std::string sha256;                                ///< of recording.json and the files it names
+  std::string sha256;     ///< of recording.json and the files it names
+  std::string mesh;       ///< specification or file that was searched; empty: an earlier program did not say
+  bool own_mesh = false;  ///< it is the recording's own
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< observed = simulated moved by this [m]
   double yaw = 0;                                    ///< [rad]
   double time_offset = 0;                            ///< [s]
@@ -99,12 +101,6 @@ struct Summary {
   std::vector<std::string> warnings;
   int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used
 };
-
-/// The specification of the mesh that was searched, or its file; empty where an earlier program did not say.
-std::string mesh_of(const Summary& summary);
-
-/// "sheet:0.2x0.2:0.02" of "sheet:0.2x0.2:0.02 (121 vertices)".
-std::string mesh_of_text(const std::string& text);
 
 /// The text of summary.json. Its last field, `digest`, covers the others: 16 digits of a SHA-256.
 std::string summary_text(const Summary& summary);

@@ -54,6 +54,9 @@ TEST(CoarseCells, OfAnAnswerTakeThreeEighthsOfTheFold) {
     const bool is_file = replay.settings.mesh == of_file.mesh;
     EXPECT_NEAR(smaller(cell / 0.5), is_file ? 0.5 : 0.75, 0.08);
     EXPECT_NEAR(smaller(cell / 2), 0.5, 0.05);  // no smaller than that
+    if (is_file) continue;
+    for (const double share : {0.41, 0.45, 0.5, 0.6})  // on a small sheet too, of which the grasp is much
+      EXPECT_LE(share * smaller(cell / share), most_of_fold_of_answer) << share;
   }
 }
 

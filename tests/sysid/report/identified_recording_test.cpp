@@ -24,6 +24,9 @@ TEST(IdentifiedRecording, IsWhatTheSearchWeighedAndHowItScored) {
   other.sha256 = std::string(64, 'b');
   other.horizon_s.reset();
   other.score_on_mesh = 0.003;
+  other.own_mesh = true;
+  summary.recordings[0].mesh = other.mesh = "sheet:0.4x0.4:0.02";
+  summary.settings["cell_scale"] = "0.5";
   summary.recordings.push_back(other);
   const data::Asset asset = tuned(summary);
   const auto first = identified_recording(asset, std::string(64, 'a')),
@@ -31,8 +34,10 @@ TEST(IdentifiedRecording, IsWhatTheSearchWeighedAndHowItScored) {
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->horizon_s, 1.9);
   EXPECT_EQ(first->score, 0.0045);
-  EXPECT_EQ(first->mesh, mesh_of(summary));
-  EXPECT_FALSE(second->horizon_s);  // each has its own
+  EXPECT_EQ(first->mesh.mesh, "sheet:0.4x0.4:0.02");
+  EXPECT_EQ(first->mesh.cell_scale, 0.5);
+  EXPECT_EQ(second->mesh.mesh, "");  // its own
+  EXPECT_FALSE(second->horizon_s);   // each has its own
   EXPECT_EQ(second->score, 0.003);
   EXPECT_FALSE(identified_recording(asset, std::string(64, 'c')));
 }

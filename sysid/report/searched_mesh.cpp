@@ -1,0 +1,81 @@
+#include "sysid/report/searched_mesh.h"
+
+#include <cmath>
+#include <filesystem>
+#include <vector>
+
+#include "data/files/error.h"
+#include "data/files/text.h"
+#include "data/mesh/procedural_mesh.h"
+#include "data/recording/recording_digest.h"
+
+namespace flash::sysid {
+namespace {
+
+std::optional<std::string> setting(const Summary& summary, const char* name) {
+  const auto found = summary.settings.find(name);
+  return found == summary.settings.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// Of a mesh, or of the recording's own where `mesh` is empty [m].
+double extent_of(const std::string& mesh, const std::string& path, const data::Recording& recording) {
+  data::Recording on = recording;
+  if (!mesh.empty()) data::load_object_mesh(mesh, path, "recordings.mesh", on);
+  return (on.mesh.vertices.colwise().maxCoeff() - on.mesh.vertices.colwise().minCoeff()).norm();
+}
+
+/// "sheet:0.2x0.2:0.02" of "sheet:0.2x0.2:0.02 (121 vertices)".
+std::string without_count(const std::string& text) { return text.substr(0, text.rfind(" (")); }
+
+/// Of each recording; of an earlier program that of the first.
+std::vector<std::string> meshes_of(const Summary& summary, const std::string& path) {
+  std::vector<std::string> meshes;
+  const std::string first = without_count(setting(summary, "mesh").value_or(""));
+  for (const SummaryRecording& recording : summary.recordings) {
+    meshes.push_back(recording.mesh.empty() ? first : recording.mesh);
+    if (meshes.back().empty())
+      throw data::input_error(path, "recordings." + recording.name + ".mesh",
+                              "missing, expected the mesh that was searched");
+  }
+  return meshes;
+}
+
+}  // namespace
+
+std::string named_mesh(const Replay& replay) {
+  const std::string& mesh = replay.settings.mesh.empty() ? replay.object_mesh : replay.settings.mesh;
+  return data::is_made_on_the_spot(mesh) ? mesh
+                                         : std::filesystem::absolute(mesh).lexically_normal().string();
+}
+
+double cell_scale_of(const std::optional<std::string>& text, const std::string& source) {
+  if (!text) return 1;
+  const std::optional<double> scale = data::parse_number(*text);
+  if (!scale || !(*scale > 0 && *scale <= 1))
+    throw data::input_error(source, "cell_scale",
+                            "found \"" + *text + "\", expected a number above 0, at most 1");
+  return *scale;
+}
+
+SearchedMesh searched_mesh(const Summary& summary, const std::string& run, const data::Recording& recording) {
+  constexpr double kSame = 0.02;  // of the extent
+  const std::string path = (std::filesystem::path(run) / "summary.json").string();
+  const double scale = cell_scale_of(setting(summary, "cell_scale"), path);
+  const std::vector<std::string> meshes = meshes_of(summary, path);
+  const std::string sha256 = data::recording_sha256(recording);
+  for (std::size_t r = 0; r < meshes.size(); ++r)
+    if (summary.recordings[r].sha256 == sha256)
+      return {summary.recordings[r].own_mesh ? "" : meshes[r], scale};
+  const double here = extent_of("", path, recording);
+  std::string sizes;
+  for (const std::string& mesh : meshes) {
+    const double searched = extent_of(mesh, path, recording);
+    if (std::abs(searched - here) <= kSame * here) return {mesh, scale};
+    sizes += (sizes.empty() ? "" : ", ") + data::format_short(searched) + " m";
+  }
+  throw data::input_error(recording.source, "object.mesh",
+                          "found an object " + data::format_short(here) + " m across, that of " + run +
+                              " is " + sizes + ": give --mesh where both are of the same material");
+}
+
+}  // namespace flash::sysid

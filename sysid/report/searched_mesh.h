@@ -1,0 +1,28 @@
+#pragma once
+#include <optional>
+#include <string>
+
+#include "data/recording/recording.h"
+#include "sysid/replay/replay.h"
+#include "sysid/report/summary.h"
+
+namespace flash::sysid {
+
+/// On which an answer simulates an object.
+struct SearchedMesh {
+  std::string mesh;       ///< specification or file; empty: the recording's own
+  double cell_scale = 1;  ///< as in ReplaySettings
+};
+
+/// The specification of the mesh of a replay before its cells are scaled, or its file, by its absolute path.
+std::string named_mesh(const Replay& replay);
+
+/// What `settings` of a summary or an asset say of the scale; 1 where they do not. `source`: names the file.
+/// Throws data::InputError where that is no number above 0, at most 1.
+double cell_scale_of(const std::optional<std::string>& text, const std::string& source);
+
+/// The mesh on which the search in the folder `run` simulated `recording`, or else the first object as large
+/// as its own. Throws data::InputError where there is none.
+SearchedMesh searched_mesh(const Summary& summary, const std::string& run, const data::Recording& recording);
+
+}  // namespace flash::sysid
