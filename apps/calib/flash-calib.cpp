@@ -18,5 +18,6 @@ int main(int argc, char** argv) {
   flash::add_handeye_verb(app, action);
   flash::add_register_verb(app, action);
   flash::add_plan_verb(app, action);
+  flash::add_export_verb(app, action);
   return flash::run_tool(app, argc, argv, [&] { return action(); });
 }

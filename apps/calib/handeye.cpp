@@ -223,23 +223,6 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
   return solved;
 }
 
-/// Frames go into URDF and command lines as they are.
-void expect_frame_names(const std::string& parent, const std::string& child) {
-  for (const auto& [option, name] :
-       {std::pair("--parent-frame", parent), std::pair("--child-frame", child)}) {
-    const bool plain = std::all_of(name.begin(), name.end(), [](char c) {
-      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-             c == '/' || c == '-' || c == '.';
-    });
-    if (!plain)
-      throw data::InputError(std::string(option) + ": expected letters, digits, _ / - and ., found \"" +
-                             name + '"');
-  }
-  if (child.empty() || parent == child)
-    throw data::InputError("--child-frame: expected a name other than that of the parent, found \"" + child +
-                           '"');
-}
-
 int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   expect_no_camera(options.lens, options.dataset.camera);
   if (!options.lens.own.empty()) options.dataset.camera = options.lens.own;

@@ -225,4 +225,20 @@ void warn_calib(const std::string& line) {
   std::cerr << "flash-calib: warning: " << data::message_line(line) << '\n';
 }
 
+void expect_frame_names(const std::string& parent, const std::string& child) {
+  for (const auto& [option, name] :
+       {std::pair("--parent-frame", parent), std::pair("--child-frame", child)}) {
+    const bool plain = std::all_of(name.begin(), name.end(), [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+             c == '/' || c == '-' || c == '.';
+    });
+    if (!plain)
+      throw data::InputError(std::string(option) + ": expected letters, digits, _ / - and ., found \"" +
+                             name + '"');
+  }
+  if (child.empty() || parent == child)
+    throw data::InputError("--child-frame: expected a name other than that of the parent, found \"" + child +
+                           '"');
+}
+
 }  // namespace flash

@@ -101,4 +101,7 @@ class Progress {
   bool visible_;
 };
 
+/// Of --parent-frame and --child-frame: throws data::InputError unless they are two names as ROS has them.
+void expect_frame_names(const std::string& parent, const std::string& child);
+
 }  // namespace flash

@@ -44,8 +44,7 @@ std::vector<std::string> meshes_of(const Summary& summary, const std::string& pa
 
 std::string named_mesh(const Replay& replay) {
   const std::string& mesh = replay.settings.mesh.empty() ? replay.object_mesh : replay.settings.mesh;
-  return data::is_made_on_the_spot(mesh) ? mesh
-                                         : std::filesystem::absolute(mesh).lexically_normal().string();
+  return data::is_made_on_the_spot(mesh) ? mesh : std::filesystem::absolute(mesh).lexically_normal().string();
 }
 
 double cell_scale_of(const std::optional<std::string>& text, const std::string& source) {

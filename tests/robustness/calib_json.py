@@ -42,7 +42,8 @@ def outputs(calib, work):
                   ("validate", work / "wrist", "--extrinsics", work / "wrist/camera.json", *cache),
                   ("validate", work / "pairs.samples", "--extrinsics", work / "left/camera.json"),
                   ("plan", work / "wrist", "--count", "2", *cache), ("intrinsics", work / "wrist", *cache),
-                  ("detect", work / "wrist", *cache)):
+                  ("detect", work / "wrist", *cache),
+                  ("export", work / "wrist/camera.json", "--to", "usd", "-o", work / "camera.usda")):
         yield " ".join(map(str, words[:2])), program.must(calib, *words, "--json").stdout
 
 

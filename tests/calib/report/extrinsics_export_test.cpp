@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <opencv2/core.hpp>
 
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/data/temporary_folder.h"
@@ -55,6 +56,30 @@ TEST(ExtrinsicsExport, EachCarriesTheLensThatItsTransformHoldsWith) {
   EXPECT_LT((pose.transform.T.matrix() - transform.T.matrix()).norm(), 1e-7);  // nine digits
   ASSERT_TRUE(pose.lens);
   EXPECT_EQ(pose.lens->cx, lens.cx);
+}
+
+TEST(ExtrinsicsExport, OpenCvReadsItsFile) {
+  const data::NamedTransform transform{"base", "camera", make_pose({0.1, -0.2, 0.3}, {0.3, -0.8, 2})};
+  data::CameraIntrinsics lens = make_scene(protocol_settings(Setup::eye_to_hand), board_points(), 1).camera;
+  lens.cx += 1.0 / 3;
+  const data::TemporaryFolder folder;
+  const std::string path = folder.write("camera.yaml", opencv_yaml(transform, lens));
+  cv::FileStorage file(path, cv::FileStorage::READ);
+  cv::Mat K, distortion, T;
+  file["camera_matrix"] >> K;
+  file["distortion_coefficients"] >> distortion;
+  file["T_parent_camera"] >> T;
+  ASSERT_EQ(T.rows * T.cols, 16);
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) EXPECT_EQ(T.at<double>(i, j), transform.T.matrix()(i, j));
+  EXPECT_EQ(K.at<double>(0, 2), lens.cx);
+  EXPECT_EQ(static_cast<int>(file["image_width"]), lens.width);
+  const data::CameraIntrinsics read = data::load_camera_intrinsics(path);  // and so does flash
+  EXPECT_EQ(read.fx, lens.fx);
+  EXPECT_EQ(read.height, lens.height);
+  ASSERT_GE(distortion.cols, static_cast<int>(lens.distortion.size()));
+  for (std::size_t k = 0; k < lens.distortion.size(); ++k)
+    EXPECT_EQ(distortion.at<double>(0, static_cast<int>(k)), lens.distortion[k]);
 }
 
 }  // namespace

@@ -21,8 +21,7 @@ TEST(ReplayMesh, IsOneWhereverItComesFrom) {
   const Replay recorded = short_corner_lift(folder, 0.1);
   const data::Recording recording = data::load_recording(folder / "towel");
   data::save_triangle_mesh(data::parse_mesh_spec("sheet:0.2x0.2:0.04:alternating"), folder / "towel.obj");
-  for (const std::string& mesh :
-       {std::string(), std::string("sheet:0.2x0.2:0.03"), folder / "towel.obj"}) {
+  for (const std::string& mesh : {std::string(), std::string("sheet:0.2x0.2:0.03"), folder / "towel.obj"}) {
     ReplaySettings settings = recorded.settings;
     settings.mesh = mesh;
     const Replay whole = make_replay(recording, settings);

@@ -43,7 +43,8 @@ TEST_F(SearchedMeshOf, ARecordingOfTheSearchIsItsOwn) {
 TEST_F(SearchedMeshOf, NoObjectOfItsSizeIsRefused) {
   summary_.recordings.pop_back();
   const std::string error = data::input_error_of([&] { searched_mesh(summary_, "run", recording_); });
-  EXPECT_NE(error.find("found an object 0.2828 m across, that of run is 0.5657 m"), std::string::npos) << error;
+  EXPECT_NE(error.find("found an object 0.2828 m across, that of run is 0.5657 m"), std::string::npos)
+      << error;
 }
 
 TEST_F(SearchedMeshOf, AnEarlierProgramNamedThatOfTheFirst) {

@@ -1,0 +1,169 @@
+#include "calib/report/robot_file.h"
+
+#include <tinyxml2.h>
+
+#include <sstream>
+#include <vector>
+
+#include "data/files/error.h"
+#include "data/files/text.h"
+
+namespace flash::calib {
+namespace {
+
+using data::input_error;
+
+std::string first_mark(const std::string& camera) { return "<!-- flash-calib: " + camera + " -->"; }
+std::string last_mark(const std::string& camera) { return "<!-- end of flash-calib: " + camera + " -->"; }
+
+/// Without the lines that an earlier call added. Throws where one of its two marks is missing.
+std::string without_camera(std::string text, const std::string& path, const std::string& camera) {
+  const std::string first = first_mark(camera), last = last_mark(camera);
+  const std::size_t begin = text.find(first), end = text.find(last);
+  if (begin == std::string::npos && end == std::string::npos) return text;
+  if (begin == std::string::npos || end == std::string::npos || end < begin)
+    throw input_error(path, camera,
+                      "found one of the comments \"" + first + "\" and \"" + last + "\", expected both");
+  const std::size_t line = text.rfind('\n', begin), after = end + last.size();
+  return text.erase(line == std::string::npos ? 0 : line,
+                    after - (line == std::string::npos ? 0 : line));
+}
+
+/// Throws unless the text is XML whose root has this name.
+void parse(const std::string& text, const std::string& path, const std::string& root,
+           tinyxml2::XMLDocument& document) {
+  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
+    throw data::InputError(path + ": is no XML: line " + std::to_string(document.ErrorLineNum()));
+  const tinyxml2::XMLElement* const element = document.RootElement();
+  if (element == nullptr || root != element->Name())
+    throw data::InputError(path + ": found <" + (element == nullptr ? "" : element->Name()) + ">, expected <" +
+                           root + ">");
+}
+
+std::string name_of(const tinyxml2::XMLElement& element) {
+  const char* const name = element.Attribute("name");
+  return name ? name : "";
+}
+
+/// The names of all elements of a kind, those inside of others too.
+void add_names(const tinyxml2::XMLElement& element, const std::string& kind, std::vector<std::string>& names) {
+  for (const auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) {
+    if (kind == child->Name()) names.push_back(name_of(*child));
+    add_names(*child, kind, names);
+  }
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  for (const std::string& each : names)
+    if (each == name) return true;
+  return false;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 12;
+  std::string text;
+  for (std::size_t k = 0; k < names.size() && k < kMost; ++k) text += (k > 0 ? ", " : "") + names[k];
+  return names.size() > kMost ? text + ", ..." : text;
+}
+
+/// Each line of `block` between the marks, moved in.
+std::string marked(const std::string& block, const std::string& camera, const std::string& indent) {
+  std::string text = "\n" + indent + first_mark(camera);
+  std::istringstream lines(block);
+  for (std::string line; std::getline(lines, line);) text += "\n" + indent + line;
+  return text + "\n" + indent + last_mark(camera);
+}
+
+/// Throws where another element of the kind has the camera's name.
+void expect_free(const std::vector<std::string>& names, const std::string& path, const std::string& kind,
+                 const std::string& camera) {
+  if (contains(names, camera))
+    throw input_error(path, kind,
+                      "found \"" + camera + "\", which flash-calib did not write, expected none: give it another with --child-frame");
+}
+
+std::size_t end_of_tag(const std::string& text, std::size_t begin) {
+  char quote = 0;
+  for (std::size_t k = begin; k < text.size(); ++k) {
+    if (quote != 0) {
+      if (text[k] == quote) quote = 0;
+    } else if (text[k] == '"' || text[k] == '\'') {
+      quote = text[k];
+    } else if (text[k] == '>') {
+      return k;
+    }
+  }
+  return std::string::npos;
+}
+
+/// Behind the opening tag of the n-th element of a kind, in the order of the document, comments left out.
+/// npos: its tag closes itself, or there is none.
+std::size_t behind_tag(const std::string& text, const std::string& kind, std::size_t n) {
+  const std::string tag = "<" + kind;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    if (text.compare(k, 4, "<!--") == 0) {
+      const std::size_t end = text.find("-->", k);
+      if (end == std::string::npos) return end;
+      k = end + 2;
+      continue;
+    }
+    if (text.compare(k, tag.size(), tag) != 0) continue;
+    const char next = k + tag.size() < text.size() ? text[k + tag.size()] : '\0';
+    if (next != '>' && next != '/' && next != ' ' && next != '\t' && next != '\n' && next != '\r') continue;
+    if (n-- > 0) continue;
+    const std::size_t end = end_of_tag(text, k);
+    return end == std::string::npos || text[end - 1] == '/' ? std::string::npos : end + 1;
+  }
+  return std::string::npos;
+}
+
+}  // namespace
+
+std::string camera_in_urdf(const std::string& text, const std::string& path,
+                           const data::NamedTransform& transform, const Lens& lens) {
+  std::string robot = without_camera(text, path, transform.child);
+  tinyxml2::XMLDocument document;
+  parse(robot, path, "robot", document);
+  std::vector<std::string> links;
+  add_names(*document.RootElement(), "link", links);
+  const bool has_macros = robot.find("xacro:") != std::string::npos;
+  if (!contains(links, transform.parent) && !has_macros)
+    throw input_error(path, "link",
+                      "found " + listed(links) + ", expected \"" + transform.parent +
+                          "\", on which the camera is: name it as the robot does with --parent-frame");
+  expect_free(links, path, "link", transform.child);
+  const std::size_t end = robot.rfind("</robot>");
+  if (end == std::string::npos)
+    throw data::InputError(path + ": found a robot without links, expected </robot> at its end");
+  const std::string block = "<link name=\"" + transform.child + "\"/>\n" + urdf_joint(transform, lens);
+  const std::size_t last = robot.find_last_not_of(" \t\r\n", end - 1);
+  return robot.insert(last + 1, marked(block, transform.child, "  "));
+}
+
+std::string camera_in_mjcf(const std::string& text, const std::string& path,
+                           const data::NamedTransform& transform, const Lens& lens) {
+  std::string robot = without_camera(text, path, transform.child);
+  tinyxml2::XMLDocument document;
+  parse(robot, path, "mujoco", document);
+  std::vector<std::string> bodies, cameras;
+  add_names(*document.RootElement(), "body", bodies);
+  add_names(*document.RootElement(), "camera", cameras);
+  expect_free(cameras, path, "camera", transform.child);
+  const bool of_world = transform.parent == "world";
+  std::size_t n = 0;
+  while (!of_world && n < bodies.size() && bodies[n] != transform.parent) ++n;
+  if (!of_world && n == bodies.size())
+    throw input_error(path, "body",
+                      "found " + listed(bodies) + ", expected \"" + transform.parent +
+                          "\", on which the camera is: name it as the robot does with --parent-frame; world is the "
+                          "worldbody");
+  const std::size_t place = behind_tag(robot, of_world ? "worldbody" : "body", n);
+  if (place == std::string::npos)
+    throw input_error(path, of_world ? "worldbody" : "body " + transform.parent,
+                      "found none with an end of its own, expected <body ...> ... </body>");
+  const std::size_t line = robot.rfind('\n', place), first = robot.find_first_not_of(" \t", line + 1);
+  const std::string indent(first - (line + 1) + 2, ' ');
+  return robot.insert(place, marked(mjcf_camera(transform, lens), transform.child, indent));
+}
+
+}  // namespace flash::calib
