@@ -360,6 +360,16 @@ def read_rows(paths):
     return twins, bounds
 
 
+def write_rows(out, twins, bounds):
+    """coverage.json, for read_rows."""
+    rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
+            for twin in sorted(twins, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]
+    part = out / "coverage.json.tmp"
+    part.write_text(json.dumps(rows, indent=1))
+    part.replace(out / "coverage.json")
+    return rows
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sysid", required=True, help="the program flash-sysid")
@@ -411,6 +421,7 @@ def main():
             found.append(twin)
             if bound is not None:
                 bounds[twin["seed"]] = bound
+            write_rows(options.out, found, bounds)  # so that a kill loses no twin
 
     take(done, finished, None)
     take(done, others, left)
@@ -422,9 +433,7 @@ def main():
         bounds[found[0]["seed"]] = least_spread(runs, kind, found[0])
     taken = [(twin["seed"], twin["wrong"]) for twin in found]
     found += [twin for twin in earlier if (twin["seed"], twin["wrong"]) not in taken]
-    rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
-            for twin in sorted(found, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]
-    (options.out / "coverage.json").write_text(json.dumps(rows, indent=1))
+    rows = write_rows(options.out, found, bounds)
     if not rows:
         print(f"\n{options.kind}: none of {len(jobs)} was searched in time")
         return 1
