@@ -24,7 +24,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study ridge-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
-.PHONY: studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
+.PHONY: cell site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -41,6 +41,12 @@ demo: configure  ## Packages, build, then the main job on depth frames it makes 
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
 	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \
 	  'Truth:       $(abspath $(DEMO)/recording/truth.json)'
+
+cell: configure-test  ## Packages, build, then recordings of a camera on a gripper and one beside it, with known truth: $(DEMO)/cell
+	cmake --build $(BUILD) -j $(JOBS) --target flash-calib rendered_dataset
+	mkdir -p $(DEMO)/cell
+	$(BUILD)/tests/rendered_dataset $(DEMO)/cell/wrist eye-in-hand charuco:7x5:0.04:0.03:DICT_5X5_100 20 640x480 0.05 0.5
+	$(BUILD)/tests/rendered_dataset $(DEMO)/cell/beside eye-to-hand charuco:7x5:0.04:0.03:DICT_5X5_100 20 640x480 0.05 0.5
 
 build: configure  ## Packages, then the release build in $(BUILD)
 	cmake --build $(BUILD) -j $(JOBS)
@@ -213,6 +219,10 @@ python-test: packages-build packages-test  ## Build the wheel of flash_sim in bu
 python-rate: python-test  ## Say how fast 128 environments step from Python beside C++, on PYTHON_DEVICE=cpu or cuda
 	build/python-venv/bin/python -P tests/validation/python_rate.py --device $(PYTHON_DEVICE)
 
+site: packages-site configure-test  ## The documents as a site that opens offline: build/site/index.html
+	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim
+	scripts/site $(PYTHON) $(BUILD)/bin
+
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i
 
@@ -231,5 +241,5 @@ install: build  ## To $(PREFIX), for find_package(flash)
 clean:  ## Remove build and demo output
 	rm -rf build $(DEMO)
 
-packages-build packages-test packages-bench packages-check: packages-%:
+packages-build packages-test packages-bench packages-check packages-site: packages-%:
 	@scripts/install-packages $*
