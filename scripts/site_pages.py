@@ -13,9 +13,9 @@ from mkdocs.structure.files import File
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PROGRAMS = ("flash-calib", "flash-sysid", "flash-sim")
-# Files outside of docs/ that are pages; README.md is for those who look at the sources, and so is docs/index.md for the site.
-PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md", "README.md": "index.md"}
-LINK = re.compile(r"(?<!!)\]\(([^)\s#]+)(#[^)\s]*)?\)|!\[[^\]]*\]\(([^)\s]+)\)")
+# Files outside of docs/ that are pages.
+PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md", "README.md": "readme.md"}
+LINK = re.compile(r"\[([^\[\]]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 LANGUAGES = {".h": "cpp", ".cpp": "cpp", ".py": "python", ".json": "json"}
 
 
@@ -80,12 +80,11 @@ def on_files(files, config):
     add("reference/cpp.md", cpp_page())
     linked = set()
     for file in files.documentation_pages():
-        linked |= {outside(file.src_uri, match[1] or match[3]) for match in LINK.finditer(file.content_string)}
+        linked |= {outside(file.src_uri, match[2]) for match in LINK.finditer(file.content_string)}
     for path, uri in PAGES.items():
-        if uri != "index.md":
-            text = (ROOT / path).read_text()
-            linked |= {posixpath.normpath(match[1] or match[3]) for match in LINK.finditer(text)}
-            add(uri, text)
+        text = (ROOT / path).read_text()
+        linked |= {posixpath.normpath(match[2]) for match in LINK.finditer(text)}
+        add(uri, text)
     for path in sorted(linked - {None, *PAGES}):
         if (ROOT / path).is_file() and not path.startswith("docs/"):
             language = LANGUAGES.get(pathlib.Path(path).suffix, "text")
@@ -96,17 +95,17 @@ def on_files(files, config):
 def on_page_markdown(markdown, page, config, files):
     """Links that leave docs/ lead to the pages made here. Those of files at the root are as seen from there."""
     here = page.file.src_uri
-    at_root = here in PAGES.values() and here != "index.md"
+    at_root = here in PAGES.values()
 
     def moved(match):
-        target = match[1]
-        if target is None or re.match(r"[a-z]+:", target):
+        text, target, anchor = match[1], match[2], match[3] or ""
+        if re.match(r"[a-z]+:", target):
             return match[0]
         path = posixpath.normpath(target) if at_root else outside(here, target)
-        if path is None:
-            return match[0]
+        if path is None or (ROOT / path).is_dir():
+            return match[0] if path is None else text  # a folder is no page
         to = path[len("docs/"):] if path.startswith("docs/") else PAGES.get(path, source_page(path))
-        return f"]({posixpath.relpath(to, posixpath.dirname(here) or '.')}{match[2] or ''})"
+        return f"[{text}]({posixpath.relpath(to, posixpath.dirname(here) or '.')}{anchor})"
 
     return LINK.sub(moved, markdown)
 
