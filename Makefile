@@ -16,6 +16,7 @@ KIND ?= lift
 PYTHON ?= /usr/bin/python3
 PYTHON_DEVICE ?= cpu
 REFERENCE ?= tests/reference
+RELEASE ?=
 
 sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
@@ -222,6 +223,10 @@ python-rate: python-test  ## Say how fast 128 environments step from Python besi
 site: packages-site configure-test  ## The documents as a site that opens offline: build/site/index.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim
 	scripts/site $(PYTHON) $(BUILD)/bin
+
+release: packages-site configure-test  ## Sources, wheel and site of the committed state in dist/, then the tag; RELEASE=--no-tag without
+	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim
+	scripts/release $(PYTHON) $(BUILD)/bin $(RELEASE)
 
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i

@@ -123,7 +123,8 @@ def of_camera(page):
     yield len(drawn) == len(with_corners), f"{page}: {len(drawn)} frames of arrows for {len(with_corners)} views"
     magnified = re.search(r"arrows ([\d.]+) times", seen["text"])
     for figure in drawn:
-        arrows = re.findall(r"M([-\d.e]+),([-\d.e]+)L([-\d.e]+),([-\d.e]+)M", figure["paths"][1])
+        # Of three strokes an arrow the first is its shaft.
+        arrows = re.findall(r"M([-\d.e]+),([-\d.e]+)L([-\d.e]+),([-\d.e]+)", figure["paths"][1])[::3]
         lengths = [math.hypot(float(c) - float(a), float(d) - float(b)) / float(magnified[1]) for a, b, c, d in arrows]
         rms = math.sqrt(sum(x * x for x in lengths) / max(1, len(lengths)))
         said = float(re.search(r"([\d.]+) px", figure["caption"])[1])

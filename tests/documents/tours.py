@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""Runs the commands of a tour, block by block, where `make cell` or `make demo` left its recording. Each prints what stands in the
+```text below it, numbers to a tenth, and ends with 0, or with the exit code that the text behind it names."""
+import argparse
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+
+import browser
+import commands
+
+NUMBER = re.compile(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
+# Pictures of the pages: the file that is shown, the size of the window [px], and what is clicked or scrolled before.
+TO = "document.getElementById('{}').scrollIntoView(); scrollBy(0, -40);".format
+PICTURES = {
+    "calibrate_a_cell.md": {},
+    "identify_a_towel.md": {},
+}
+
+
+def commands_of_make(target):
+    """Lines of a target of the Makefile, its own variables in place."""
+    text = re.search(rf"^{target}:.*\n((?:\t.*\n)+)", (commands.ROOT / "Makefile").read_text(), re.MULTILINE)[1]
+    return [line.strip() for line in text.splitlines()]
+
+
+def prepare(out, draw, demo):
+    """The folder in which the commands are run: examples/ of the checkout, and demo/ as make leaves it."""
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    (out / "examples").symlink_to(commands.ROOT / "examples")
+    if demo:
+        shutil.copytree(demo, out / "demo", ignore=shutil.ignore_patterns("motions"))
+    if draw:
+        (out / "demo/cell").mkdir(parents=True)
+        for line in commands_of_make("cell"):
+            if "rendered_dataset " in line:
+                words = shlex.split(line.replace("$(DEMO)", "demo"))
+                subprocess.run([draw, *words[1:]], cwd=out, check=True, stdout=subprocess.DEVNULL)
+
+
+def same_numbers(said, found):
+    """To a tenth, or two units of the last digit that is stated."""
+    for a, b in zip(NUMBER.findall(said), NUMBER.findall(found)):
+        x, y = float(a.replace(",", "")), float(b.replace(",", ""))
+        last = 10.0 ** -len(re.sub(r"^[^.]*\.?|e.*$", "", a))
+        if abs(x - y) > 0.1 * abs(x) + 2 * last:
+            return False
+    return True
+
+
+def prints(said, found):
+    """Whether the line is as it is said; a line that ends with ... is cut there."""
+    start = said.removesuffix("...").rstrip()
+    shape = NUMBER.sub("#", start)
+    found_shape = NUMBER.sub("#", found.rstrip())
+    fits = found_shape.startswith(shape) if said.endswith("...") else found_shape == shape
+    return fits and same_numbers(start, found)
+
+
+def missing(said, found):
+    """Lines of a ```text block that are not printed in their order; a line of dots stands for any."""
+    lines, k = [line.rstrip() for line in found.splitlines()], 0
+    for line in (line for line in said if line.strip() not in ("", "...")):
+        at = next((i for i in range(k, len(lines)) if prints(line.rstrip(), lines[i])), None)
+        if at is None:
+            yield line
+        else:
+            k = at + 1
+
+
+def run(page, out, path):
+    """Complaints about the page."""
+    found = commands.blocks((commands.ROOT / "docs" / page).read_text())
+    after = [prose for _, _, prose in found[1:]] + [""]
+    count = 0
+    for k, (language, lines, _) in enumerate(found):
+        if language != commands.RUN:
+            continue
+        count += 1
+        script = "\n".join(lines)
+        done = subprocess.run(["bash", "-e", "-c", script], cwd=out, text=True, errors="replace", stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, env={**os.environ, "PATH": f"{path}:{os.environ['PATH']}"})
+        shown = k + 1 < len(found) and found[k + 1][0] == "text"
+        prose = after[k] + (after[k + 1] if shown else "")
+        codes = [int(code) for code in re.findall(r"exit code (?:is )?(\d)", prose)]
+        if done.returncode not in (codes or [0]):
+            yield f"{page}: {script}\nends with {done.returncode}, the page says {codes or 0}:\n{done.stdout}"
+        if shown and (lacking := list(missing(found[k + 1][1], done.stdout))):
+            yield f"{page}: {script}\ndoes not print:\n" + "\n".join(lacking) + f"\nbut:\n{done.stdout}"
+    if not count:
+        yield f"{page}: no block ```{commands.RUN}"
+
+
+def draw_pictures(page, out, images):
+    for name, (shown, width, height, script) in PICTURES.get(page, {}).items():
+        browser.picture(out / shown, images / name, width, height, script)
+        print(images / name)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("pages", nargs="+", help="of docs/, with blocks ```sh")
+    parser.add_argument("--bin", required=True, type=pathlib.Path, help="the folder of the programs")
+    parser.add_argument("--draw", help="the program rendered_dataset")
+    parser.add_argument("--demo", type=pathlib.Path, help="what make demo left")
+    parser.add_argument("--out", required=True, type=pathlib.Path)
+    parser.add_argument("--images", type=pathlib.Path, help="draw the pictures of the pages into this folder")
+    options = parser.parse_args()
+    out = options.out.resolve()
+    prepare(out, options.draw, options.demo)
+    wrong = []
+    for page in options.pages:
+        wrong += run(page, out, options.bin.resolve())
+        if options.images:
+            draw_pictures(page, out, options.images)
+    if wrong:
+        sys.exit("\n\n".join(wrong))
+    print(f"{', '.join(options.pages)}: every command does what the page says")
+
+
+if __name__ == "__main__":
+    main()
