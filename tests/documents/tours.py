@@ -14,10 +14,16 @@ import browser
 import commands
 
 NUMBER = re.compile(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
-# Pictures of the pages: the file that is shown, the size of the window [px], and what is clicked or scrolled before.
-TO = "document.getElementById('{}').scrollIntoView(); scrollBy(0, -40);".format
+# Pictures of the pages: the file that is shown, the size of the window [px], and the one section that is kept of it.
+ONLY = "for (const e of document.querySelectorAll('main > *')) if (e.id !== '{}') e.remove();".format
 PICTURES = {
-    "calibrate_a_cell.md": {},
+    "calibrate_a_cell.md": {
+        "handeye_report.png": ("demo/cell/wrist.html", 1180, 960, ""),
+        "cell_arrows.png": ("demo/cell/wrist.html", 1180, 670, ONLY("residual-section")),
+        "cell_size.png": ("demo/cell/size.html", 1180, 560, ""),
+        "cell_slip.png": ("demo/cell/slip.html", 1180, 500, ONLY("pictures-section")),
+        "cell_knock.png": ("demo/cell/knock.html", 1180, 560, ""),
+    },
     "identify_a_towel.md": {},
 }
 
