@@ -12,7 +12,7 @@ OPTIONS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enabl
            "--hide-scrollbars", "--force-device-scale-factor=1", "--no-first-run", "--disable-extensions", "--lang=en-US",
            "--disable-background-networking", "--virtual-time-budget=20000", "--run-all-compositor-stages-before-draw")
 # What software rendering logs by itself.
-HARMLESS = ("GPU stall due to ReadPixels", "Automatic fallback to software WebGL")
+HARMLESS = ("GPU stall due to ReadPixels", "Automatic fallback to software WebGL", "willReadFrequently")
 
 # Runs in the page after its own scripts. Its result is JSON in an element of its own.
 PROBE = r"""

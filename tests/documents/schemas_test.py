@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""Files that the programs write, and assets that ship, are as docs/schemas says; what lacks a field or has another is not; the
+schemas know the fields that the loaders know. Skips where jsonschema is not installed."""
+import argparse
+import copy
+import json
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+LOADERS = {"flash-recording-1.json": ("data/recording/recording.cpp", "data/recording/recording_markers.cpp"),
+           "flash-asset-1.json": ("data/asset/asset.cpp",)}
+
+
+def fields_of(schema):
+    """The names of the fields of each object of a schema."""
+    if isinstance(schema, dict):
+        if "properties" in schema:
+            yield set(schema["properties"])
+        for value in schema.values():
+            yield from fields_of(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            yield from fields_of(value)
+
+
+def spoilt(value):
+    """Copies of an object that are no good: without its schema, with a field that is not known."""
+    yield {key: field for key, field in value.items() if key != "schema"}
+    yield {**copy.deepcopy(value), "shcema": 1}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folders", nargs="*", type=pathlib.Path, help="searched for JSON of the programs")
+    options = parser.parse_args()
+    try:
+        import jsonschema
+    except ImportError:
+        print("skipped: found no jsonschema, apt-get install python3-jsonschema")
+        return
+    schemas = {path.name: json.loads(path.read_text()) for path in sorted((ROOT / "docs/schemas").glob("*.json"))}
+    wrong, counts = [], dict.fromkeys(schemas, 0)
+    # Debian's jsonschema knows 2020-12; what stands in the schemas is the same in the drafts before.
+    kind = getattr(jsonschema, "Draft202012Validator", jsonschema.Draft7Validator)
+    for name, schema in schemas.items():
+        kind.check_schema(schema)
+        for source in LOADERS.get(name, ()):
+            for known in re.findall(r"expect_fields\(\{(.*?)\}\)", (ROOT / source).read_text(), re.DOTALL):
+                names = set(re.findall(r'"([^"]+)"', known)) - {"bending"}  # of the published format
+                if names not in list(fields_of(schema)):
+                    wrong.append(f"docs/schemas/{name}: no object has the fields {sorted(names)} of {source}")
+    for path in [path for folder in [ROOT / "examples/assets", *options.folders] for path in sorted(folder.rglob("*.json"))]:
+        value = json.loads(path.read_text())
+        named = value.get("schema", "") if isinstance(value, dict) else ""
+        name = named.replace("/", "-") + ".json"
+        if name not in schemas:
+            continue
+        counts[name] += 1
+        validator = kind(schemas[name])
+        wrong += [f"{path}: {error.json_path if hasattr(error, 'json_path') else list(error.path)}: {error.message[:200]}"
+                  for error in validator.iter_errors(value)]
+        wrong += [f"docs/schemas/{name} takes what is spoilt of {path}" for bad in spoilt(value) if validator.is_valid(bad)]
+    if options.folders:
+        wrong += [f"found no file of {name}" for name, count in counts.items() if not count]
+    if wrong:
+        sys.exit("\n".join(wrong))
+    print(", ".join(f"{count} of {name}" for name, count in counts.items()), "are as docs/schemas says")
+
+
+if __name__ == "__main__":
+    main()
