@@ -25,7 +25,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study ridge-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
-.PHONY: cell site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
+.PHONY: cell pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -223,6 +223,11 @@ python-rate: python-test  ## Say how fast 128 environments step from Python besi
 site: packages-site configure-test  ## The documents as a site that opens offline: build/site/index.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim
 	scripts/site $(PYTHON) $(BUILD)/bin
+
+pictures: packages-site configure-test  ## Draw the pictures of the tours and of reports anew, into docs/images, after make demo
+	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid rendered_dataset
+	$(PYTHON) tests/documents/tours.py calibrate_a_cell.md identify_a_towel.md --bin $(BUILD)/bin --draw $(BUILD)/tests/rendered_dataset \
+	  --demo $(DEMO) --out $(BUILD)/tours --images docs/images
 
 release: packages-site configure-test  ## Sources, wheel and site of the committed state in dist/, then the tag; RELEASE=--no-tag without
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim

@@ -24,7 +24,7 @@ addEventListener("load", () => setTimeout(() => {
   for (const p of document.querySelectorAll(".js-plotly-plot"))
     plots[p.id] = {shown: shown(p), drawn: p.querySelectorAll("canvas, path").length,
       traces: p.data.map(t => ({type: t.type || "scatter", name: t.name, x: flat(t.x), y: flat(t.y), z: flat(t.z), color: t.marker && t.marker.color})),
-      shapes: (p.layout.shapes || []).map(s => ({type: s.type, x0: s.x0, x1: s.x1, fill: s.fillcolor}))};
+      shapes: (p.layout.shapes || []).map(s => ({type: s.type, x0: s.x0, x1: s.x1, fill: s.fillcolor, dash: s.line && s.line.dash}))};
   const result = {
     title: document.title, text: document.body.innerText, plots,
     wide: document.documentElement.scrollWidth - document.documentElement.clientWidth,
@@ -72,6 +72,9 @@ def probed(page):
 
 def picture(page, out, width, height, script=""):
     """A picture of the first `height` pixels of the page; `script` runs before, as to scroll or to open a section."""
+    if pathlib.Path(page).suffix != ".html":
+        run(page, f"--screenshot={pathlib.Path(out).resolve()}", f"--window-size={width},{height}")
+        return
     with tempfile.TemporaryDirectory() as folder:
         copy = pathlib.Path(folder) / "page.html"
         late = f"<script>addEventListener('load', () => setTimeout(() => {{ {script} }}, 1000));</script>"

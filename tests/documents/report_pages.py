@@ -31,6 +31,8 @@ def of_any(page, seen):
     yield not bad, f"{page}: says {bad and bad[0]}"
     for section in seen["sections"]:
         yield not section["shown"] or section["text"] + section["drawn"] > 0, f"{page}: nothing in section {section['title'] or section['id']}"
+    dashes = {shape.get("dash") for plot in seen["plots"].values() for shape in plot["shapes"]}
+    yield "Dashed:" not in seen["text"] or "dash" in dashes, f"{page}: speaks of a dashed line, and has none"
     for name, plot in seen["plots"].items():
         yield not plot["shown"] or plot["drawn"] > 0, f"{page}: plot {name} is not drawn"
 
@@ -117,6 +119,10 @@ def of_camera(page):
     yield rows["comparison"][-1][-1] == "the answer", f"{page}: the last method is not the answer: {rows['comparison'][-1]}"
     for view, row in zip(answer["views"], rows["views"][1:]):
         yield row[0] == view["image"] and row[-1].startswith("left out") != view["used"], f"{page}: view {row}"
+    worst = [view["image"] for view in sorted(used, key=lambda view: -(view.get("chain_px") or 0))]
+    shown = [figure["caption"].split()[0] for figure in seen["figures"] if not figure["paths"]]
+    shown = [image for image in shown if image in worst]
+    yield shown == worst[:len(shown)], f"{page}: the worst views are {worst[:3]}, it shows {shown[:3]} first"
     # Each frame of arrows has the rms that stands below it.
     drawn = [figure for figure in seen["figures"] if len(figure["paths"]) == 2]
     with_corners = [view for view in used if view.get("chain_px") is not None]

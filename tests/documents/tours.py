@@ -18,13 +18,23 @@ NUMBER = re.compile(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
 ONLY = "for (const e of document.querySelectorAll('main > *')) if (e.id !== '{}') e.remove();".format
 PICTURES = {
     "calibrate_a_cell.md": {
-        "handeye_report.png": ("demo/cell/wrist.html", 1180, 960, ""),
+        "handeye_report.png": ("demo/cell/wrist.html", 1180, 880, ""),
         "cell_arrows.png": ("demo/cell/wrist.html", 1180, 670, ONLY("residual-section")),
         "cell_size.png": ("demo/cell/size.html", 1180, 560, ""),
         "cell_slip.png": ("demo/cell/slip.html", 1180, 500, ONLY("pictures-section")),
         "cell_knock.png": ("demo/cell/knock.html", 1180, 560, ""),
     },
-    "identify_a_towel.md": {},
+    "identify_a_towel.md": {
+        "towel_segment.png": ("demo/segmented/segment.svg", 1856, 723, ""),
+        "towel_armless.png": ("demo/armless/segment.svg", 1856, 723, ""),
+        "towel_fast.png": ("demo/fast/segment.svg", 1856, 723, ""),
+        "towel_import.png": ("demo/lift/import.svg", 698, 899, ""),
+        "report.png": ("demo/run/report.html", 1180, 700, ""),
+        "towel_profiles.png": ("demo/run/report.html", 1180, 480, ONLY("profile-section")),
+        "towel_low.png": ("demo/low/report.html", 1180, 620, ""),
+        "towel_small.png": ("demo/small/report.html", 1180, 620, ""),
+        "towel_replay.png": ("demo/check/sequence.png", 0, 0, ""),
+    },
 }
 
 
@@ -104,7 +114,10 @@ def run(page, out, path):
 
 def draw_pictures(page, out, images):
     for name, (shown, width, height, script) in PICTURES.get(page, {}).items():
-        browser.picture(out / shown, images / name, width, height, script)
+        if shown.endswith(".png"):
+            shutil.copyfile(out / shown, images / name)
+        else:
+            browser.picture(out / shown, images / name, width, height, script)
         print(images / name)
 
 
