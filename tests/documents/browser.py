@@ -9,7 +9,7 @@ import tempfile
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 # One profile a call; WebGL by the processor, so that it draws the same where there is no device.
 OPTIONS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-vsync",
-           "--hide-scrollbars", "--force-device-scale-factor=1", "--no-first-run", "--disable-extensions", "--lang=en-US",
+           "--hide-scrollbars", "--disable-dev-shm-usage", "--force-device-scale-factor=1", "--no-first-run", "--disable-extensions", "--lang=en-US",
            "--disable-background-networking", "--virtual-time-budget=20000", "--run-all-compositor-stages-before-draw")
 # What software rendering logs by itself.
 HARMLESS = ("GPU stall due to ReadPixels", "Automatic fallback to software WebGL", "willReadFrequently")
