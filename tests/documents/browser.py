@@ -1,16 +1,19 @@
 """Pages in headless Chromium (Debian's chromium): what a page logs, what stands in it once its scripts have run, and pictures of it."""
 import json
+import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import tempfile
 
+TRIES, SECONDS = 3, 90
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 # One profile a call; WebGL by the processor, so that it draws the same where there is no device.
 OPTIONS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-vsync",
            "--hide-scrollbars", "--disable-dev-shm-usage", "--force-device-scale-factor=1", "--no-first-run", "--disable-extensions", "--lang=en-US",
-           "--disable-background-networking", "--virtual-time-budget=20000", "--run-all-compositor-stages-before-draw")
+           "--disable-background-networking", "--virtual-time-budget=20000")
 # What software rendering logs by itself.
 HARMLESS = ("GPU stall due to ReadPixels", "Automatic fallback to software WebGL", "willReadFrequently")
 
@@ -51,9 +54,22 @@ def program():
 
 
 def run(page, *options):
-    with tempfile.TemporaryDirectory() as profile:
-        return subprocess.run([program(), *OPTIONS, f"--user-data-dir={profile}", *options, pathlib.Path(page).resolve().as_uri()],
-                              capture_output=True, text=True, errors="replace", timeout=240, check=True)
+    """stdout and stderr. Once in some hundred calls Chromium does not come to its end: then it is started anew."""
+    for _ in range(TRIES):
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+            words = [program(), *OPTIONS, f"--user-data-dir={profile}", *options, pathlib.Path(page).resolve().as_uri()]
+            started = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace",
+                                       start_new_session=True)
+            try:
+                out, err = started.communicate(timeout=SECONDS)
+            except subprocess.TimeoutExpired:
+                os.killpg(started.pid, signal.SIGKILL)  # its own children alone
+                started.communicate()
+                continue
+            if started.returncode == 0:
+                return out, err
+            raise SystemExit(f"{page}: chromium ends with {started.returncode}: {err[-500:]}")
+    raise SystemExit(f"{page}: chromium did not end in {SECONDS} s, {TRIES} times")
 
 
 def probed(page):
@@ -62,11 +78,11 @@ def probed(page):
         copy = pathlib.Path(folder) / "page.html"
         text = pathlib.Path(page).read_text()
         copy.write_text(text.replace("</body>", PROBE + "</body>"))
-        done = run(copy, "--dump-dom", "--enable-logging=stderr", "--window-size=1280,1000")
-    found = re.search(r'<script type="application/json" id="probe">(.*?)</script>', done.stdout, re.DOTALL)
-    log = [line for line in done.stderr.splitlines() if "CONSOLE" in line and not any(word in line for word in HARMLESS)]
+        out, err = run(copy, "--dump-dom", "--enable-logging=stderr", "--window-size=1280,1000")
+    found = re.search(r'<script type="application/json" id="probe">(.*?)</script>', out, re.DOTALL)
+    log = [line for line in err.splitlines() if "CONSOLE" in line and not any(word in line for word in HARMLESS)]
     if not found:
-        raise SystemExit(f"{page}: its scripts did not come to their end: {log or done.stderr[-500:]}")
+        raise SystemExit(f"{page}: its scripts did not come to their end: {log or err[-500:]}")
     return {**json.loads(found[1]), "log": log}
 
 

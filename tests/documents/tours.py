@@ -135,10 +135,10 @@ def main():
     wrong = []
     for page in options.pages:
         wrong += run(page, out, options.bin.resolve())
-        if options.images:
-            draw_pictures(page, out, options.images)
     if wrong:
         sys.exit("\n\n".join(wrong))
+    for page in options.pages if options.images else []:
+        draw_pictures(page, out, options.images)
     print(f"{', '.join(options.pages)}: every command does what the page says")
 
 
