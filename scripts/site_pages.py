@@ -53,7 +53,7 @@ def cpp_page():
     rows = ["| folder | its headers |", "|---|---|"]
     for folder in sorted({path.parent for module in ("data", "sim", "calib", "sysid") for path in (ROOT / module).glob("*/*.h")}):
         names = [f"`{path.name}`" for path in sorted(folder.glob("*.h"))]
-        rows.append(f"| `{folder.relative_to(ROOT)}` | {' '.join(names)} |")
+        rows.append(f"| {folder.relative_to(ROOT)} | {' '.join(names)} |")
     return ("# C++\n\nThe libraries are `flash::data`, `flash::sim`, `flash::calib` and `flash::sysid`. A header is the page a "
             "reader stops at: what it is, its equation, units, shapes, errors, source. "
             "<a href=\"../cpp/annotated.html\">All classes</a> and <a href=\"../cpp/files.html\">all headers</a> are "
