@@ -21,6 +21,8 @@ def main():
     version = found("CMakeLists.txt", r"^project\(flash VERSION ([0-9]+\.[0-9]+\.[0-9]+) ")
     others = {"CITATION.cff": found("CITATION.cff", r"^version: (.*)$"),
               "CHANGELOG.md": found("CHANGELOG.md", r"^## ([0-9.]+)"),
+              "tests/consumer": version if found("tests/consumer/CMakeLists.txt", r"^find_package\(flash ([0-9.]+) ") ==
+              version.rpartition(".")[0] else "another one",
               "pyproject.toml": version if "\nversion" not in (ROOT / "pyproject.toml").read_text() else "one of its own"}
     for program in options.programs:
         said = subprocess.run([program, "--version"], check=True, capture_output=True, text=True).stdout
