@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
-"""Files that the programs write, and assets that ship, are as docs/schemas says; what lacks a field or has another is not; the
-schemas know the fields that the loaders know. Skips where jsonschema is not installed."""
+"""Files that the programs write, and assets that ship, are as docs/schemas says; spoilt ones are not; the schemas know the fields
+that the loaders know. Skips where jsonschema is not installed."""
 import argparse
-import copy
 import json
 import pathlib
 import re
@@ -25,10 +24,14 @@ def fields_of(schema):
             yield from fields_of(value)
 
 
-def spoilt(value):
-    """Copies of an object that are no good: without its schema, with a field that is not known."""
-    yield {key: field for key, field in value.items() if key != "schema"}
-    yield {**copy.deepcopy(value), "shcema": 1}
+def spoilt(value, schema):
+    """Copies of an object that are no good: without what is required, with a field of another type, or with one that is not known."""
+    for name in schema["required"]:
+        yield f"without {name}", {key: field for key, field in value.items() if key != name}
+    for name in schema["properties"].keys() & value.keys():
+        yield f"{name}: true", {**value, name: 17 if isinstance(value[name], bool) else True}
+    if schema.get("additionalProperties") is False:
+        yield "shcema", {**value, "shcema": 1}
 
 
 def main():
@@ -61,7 +64,7 @@ def main():
         validator = kind(schemas[name])
         wrong += [f"{path}: {error.json_path if hasattr(error, 'json_path') else list(error.path)}: {error.message[:200]}"
                   for error in validator.iter_errors(value)]
-        wrong += [f"docs/schemas/{name} takes what is spoilt of {path}" for bad in spoilt(value) if validator.is_valid(bad)]
+        wrong += [f"docs/schemas/{name} takes {path} with {what}" for what, bad in spoilt(value, schemas[name]) if validator.is_valid(bad)]
     if options.folders:
         wrong += [f"found no file of {name}" for name, count in counts.items() if not count]
     if wrong:
