@@ -120,6 +120,9 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   std::printf("%zu of %zu views; %s %.3f deg %.2f mm an axis\n", c.used.size(), c.views.size(),
               corners.c_str(), kDegrees * extrinsics.robot_rotation_rad,
               1e3 * extrinsics.robot_translation_m);
+  if (c.sight_noise)
+    std::printf("places %.2f mm across the line of sight, %.2f mm along it\n", 1e3 * c.sight_noise->across,
+                1e3 * c.sight_noise->along);
   if (extrinsics.pixels) {
     print_lens(c);
     const std::string warp = calib::describe(c.warp);

@@ -14,6 +14,7 @@
 #include "calib/check/cloud_check.h"
 #include "calib/check/contradiction.h"
 #include "calib/check/projection_check.h"
+#include "calib/check/same_place.h"
 #include "calib/report/overlay.h"
 #include "data/camera/posed_lens.h"
 #include "data/files/atomic_file.h"
@@ -61,7 +62,8 @@ std::vector<ValidatedView> views_of(const calib::Dataset& dataset, const calib::
   return views;
 }
 
-constexpr const char *kResult = "validation.json", *kPattern = "pattern.png", *kProfile = "profile.png";
+constexpr const char *kResult = "validation.json", *kPattern = "pattern.png", *kProfile = "profile.png",
+                     *kPlacement = "placement.json";
 
 std::string corner_path(const std::string& folder, const calib::Frame& frame) {
   return (fs::path(folder) / "corners" / (fs::path(frame.name).stem().string() + ".png")).string();
@@ -177,7 +179,46 @@ data::PosedLens lens_of(const calib::Extrinsics& extrinsics, const calib::Datase
                           choice);
 }
 
+/// Whether a file is what flash-calib handeye has written.
+bool is_calibration(const std::string& path) {
+  if (!fs::is_regular_file(path) || fs::path(path).extension() != ".json") return false;
+  const nlohmann::json file = data::load_json(path);
+  const auto schema = file.is_object() ? file.find("schema") : file.end();
+  return file.is_object() && schema != file.end() && schema->is_string() &&
+         schema->get<std::string>().starts_with("flash-extrinsics/");
+}
+
+/// Whether the camera of a second calibration stands where that of the first does.
+int run_placement(const ValidateOptions& options) {
+  const calib::Extrinsics first = calib::load_extrinsics(options.extrinsics, options.despite_doubts),
+                          second = calib::load_extrinsics(options.dataset.path, options.despite_doubts);
+  const calib::Placement found = calib::placement(first, second, options.extrinsics, options.dataset.path);
+  const int exit_code = found.moved ? exit_unusable : exit_done;
+  const nlohmann::ordered_json json = {{"schema", "flash-placement/1"},
+                                       {"extrinsics", options.extrinsics},
+                                       {"other", options.dataset.path},
+                                       {"apart_mm", 1e3 * found.apart.head<3>().norm()},
+                                       {"apart_deg", found.apart.tail<3>().norm() * 180 / M_PI},
+                                       {"chi_square", found.chi_square},
+                                       {"chance", found.chance},
+                                       {"moved", found.moved},
+                                       {"exit_code", exit_code}};
+  const std::string text = data::format_json(json) + '\n';
+  if (!options.out.empty()) data::write_atomically((fs::path(options.out) / kPlacement).string(), text);
+  const std::string sentence = calib::describe(found);
+  if (options.common.json)
+    std::cout << text;
+  else
+    std::printf("%s\n", sentence.c_str());
+  if (found.moved) say_unusable(sentence, "the second recording contradicts the calibration");
+  return exit_code;
+}
+
 int run_validate(const CLI::App& verb, ValidateOptions options) {
+  if (is_calibration(options.dataset.path)) {
+    if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
+    return run_placement(options);
+  }
   std::string own;
   const data::LensChoice choice = data::parse_lens_choice(options.lens, own);
   expect_no_camera({.own = own}, options.dataset.camera);
@@ -266,8 +307,10 @@ void add_validate_verb(CLI::App& app, Action& action) {
   add_calib_common_options(*verb, options->common);
   add_doubts_option(*verb, options->despite_doubts, "Use a calibration that handeye ended with exit code 3");
   verb->footer(
-      "Exit code 3: these views are missed by three times what the calibration states, or it cannot be "
-      "used.\n"
+      "In place of a recording it takes what handeye has written of a later one, and says whether the "
+      "camera stands where it did.\n"
+      "Exit code 3: these views are missed by three times what the calibration states, the camera has moved, "
+      "or the calibration cannot be used.\n"
       "Example:\n"
       "  flash-calib validate another_recording --target chessboard:9x6:0.025 --extrinsics camera.json -o "
       "checked");

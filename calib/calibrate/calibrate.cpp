@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "calib/calibrate/compare_methods.h"
+#include "calib/calibrate/expect_convention.h"
 #include "calib/calibrate/misfit_views.h"
 #include "calib/calibrate/moving_rig.h"
 #include "calib/calibrate/plausibility.h"
@@ -55,38 +56,22 @@ std::string first_left_out(const ViewSelection& selection) {
   return {};
 }
 
-/// Refuses input that closes only when it is read otherwise than stated, or not at all.
-void expect_convention(Setup setup, const std::vector<Observation>& observations,
-                       const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
-                       const CalibrateSettings& settings) {
-  const std::optional<Finding> finding =
-      check_convention(setup, observations, symmetries, stated, settings.angles, settings.convention);
-  if (finding) throw data::InputError(finding->sentence);
-  if (const std::optional<Finding> pairing =
-          check_pairing(setup, observations, symmetries, stated, settings.convention))
-    throw data::InputError(pairing->sentence);
-  const bool hopeless = !(stated.found && stated.score < settings.hopeless);
+/// The size with which views close, where it is to be solved for and they do not with that which is stated;
+/// else 1. So many times as large is a unit.
+double size_to_begin_with(const Calibration& result, const std::vector<Observation>& all,
+                          const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings) {
+  constexpr double kUnit = 20;
+  if (settings.size_as_stated || !settings.target_size_sd || std::isfinite(*settings.target_size_sd))
+    return 1;
   const std::optional<Finding> sized =
-      check_size(setup, observations, symmetries, stated, settings.convention);
-  if (sized && (hopeless || !measurable_size(sized->size))) throw data::InputError(sized->sentence);
-  if (!hopeless) return;
-  if (!stated.found)
-    throw data::InputError(
-        "robot and camera do not tell of the same motion: no three of " +
-        std::to_string(observations.size()) +
-        " views turn by the same angles, and no other convention explains them; check that each picture, or "
-        "pose of the target, stands beside the robot's pose of its moment");
-  constexpr double kTurnsAgree = 1 * kDegree;
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "robot and camera do not tell of the same motion: most views close to no better than %.1f deg and "
-      "%.0f mm, and no other convention explains them; %s",
-      stated.rotation / kDegree, 1e3 * stated.translation,
-      stated.found && stated.rotation < kTurnsAgree
-          ? "turns agree and places do not: look for mirrored pictures, and for places in other columns"
-          : "check that each image stands beside its pose");
-  throw data::InputError(text);
+      check_size(result.setup, all, symmetries, result.selection.robust_seed, settings.convention);
+  return sized && sized->size < kUnit && sized->size * kUnit > 1 ? sized->size : 1;
+}
+
+/// As seen of a target that is so many times as large.
+void resize(std::vector<Observation>& observations, double size) {
+  for (Observation& observation : observations)
+    for (Eigen::Isometry3d& T : observation.T_camera_target) T.translation() *= size;
 }
 
 /// The solution's bundle with the poses of the answer.
@@ -120,13 +105,13 @@ void report_views(Calibration& result) {
 }
 
 /// Of the projected middle of the target against where the view's own pose puts it, by the lens as `stated`,
-/// with which that pose was found.
+/// with which that pose was found, and of a target of that size over the stated one.
 double centre_rms(const Bundle& bundle, const data::CameraIntrinsics& stated,
-                  const std::vector<Eigen::Isometry3d>& T_camera_target) {
+                  const std::vector<Eigen::Isometry3d>& T_camera_target, double size) {
   const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics.front()), own = to_vector(stated);
   double sum = 0;
   for (const BundleView& view : bundle.views) {
-    const Eigen::Vector3d centre = view.points.rowwise().mean();
+    const Eigen::Vector3d centre = size * view.points.rowwise().mean();
     const Eigen::Vector3d true_centre = true_points(bundle, view).rowwise().mean();
     sum += (project(intrinsics, predicted_pose(bundle, view, false) * true_centre) -
             project(own, T_camera_target[static_cast<std::size_t>(view.pose)] * centre))
@@ -168,6 +153,7 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
     const HandEyePoses seed = better_of(loops, shah(loops), result.selection.robust_seed.poses);
     Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
     plain.priors = priors_of(camera, points, settings);
+    plain.scales = {result.size_begun};
     result.refined = refine(plain, refine_settings);
     const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
     if (dropping && !few && drop_worst(result, observations, settings.surprise)) continue;
@@ -325,13 +311,24 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
   for (const Observation& observation : all)
     if (!observation.T_camera_target.empty()) reported.push_back(observation.T_base_gripper);
   expect_enough(reported.size(), all.size(), settings.least_views);
+  expect_motion(reported);
   const std::string reason = degeneracy(rotation_diversity(reported));
   if (!reason.empty()) throw data::InputError(reason);
   result.selection = select_views(result.setup, all, symmetries, settings.selection);
-  expect_convention(result.setup, all, symmetries, result.selection.robust_seed, settings);
+  std::vector<Observation> sized = all;
+  result.size_begun = size_to_begin_with(result, all, symmetries, settings);
+  if (result.size_begun != 1) {
+    resize(sized, result.size_begun);
+    result.selection = select_views(result.setup, sized, symmetries, settings.selection);
+  }
+  expect_convention(result.setup, sized, symmetries, result.selection.robust_seed, settings);
   std::vector<Observation> observations = used_observations(result.selection, &result.used);
   expect_enough(observations.size(), all.size(), settings.least_views, first_left_out(result.selection));
   return observations;
+}
+
+void restore_size(Calibration& result) {
+  if (result.size_begun != 1) resize(result.selection.observations, 1 / result.size_begun);
 }
 
 bool finish(Calibration& result, const std::vector<Observation>& used) {
@@ -368,7 +365,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
   const std::string noisy = implausible_noise(result.refined.noise, observations);
   if (!noisy.empty()) throw data::InputError(cause_of(result, all, symmetries, settings).value_or(noisy));
-  SizedRefinement sized = refine_sizes(std::move(result.refined), refine_settings);
+  SizedRefinement sized = refine_sizes(std::move(result.refined), refine_settings, result.size_begun);
   result.refined = std::move(sized.refined);
   result.size = sized.sizes.front();
   if (std::isinf(*settings.target_size_sd) && !result.size->wanted)
@@ -389,7 +386,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.poses = result.comparison.back().poses;
   result.corner_rms = reprojection_rms(bundle, true);
   result.chain_rms = result.comparison.back().px;
-  result.centre_rms = centre_rms(answer_of(result), camera, target_poses(observations));
+  result.centre_rms = centre_rms(answer_of(result), camera, target_poses(observations), result.size_begun);
   const double smooth = add_uncertainty(result, sized.systematic, refine_settings.bundle);
   if (result.method == Method::pixels) {
     result.covariance = pixels->covariance;
@@ -421,6 +418,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   warn_of_shapes(result, sized.disputed, settings);
   if (!plausible)
     if (const auto cause = cause_of(result, all, symmetries, settings)) tell_first(result, *cause, true);
+  restore_size(result);
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/convention_check.h"
 #include "calib/solve/errors_in_variables.h"
+#include "calib/solve/pose_space.h"
 #include "calib/solve/view_selection.h"
 #include "calib/uncertainty/correlated_pose_errors.h"
 #include "calib/uncertainty/knock.h"
@@ -60,6 +61,7 @@ struct Calibration {
   ViewSelection selection;
   std::vector<int> used;  ///< views in the solution, by their place in the set
   Refinement refined;
+  std::optional<SightNoise> sight_noise;  ///< of pairs of poses
   HandEyePoses poses;
   Matrix6d covariance = Matrix6d::Zero();         ///< of X, right perturbation (dt, dtheta)
   Matrix6d repeatable = covariance;               ///< of what scatters alone
@@ -82,6 +84,7 @@ struct Calibration {
   RotationDiversity diversity;
   WeakestDirection weakest;
   std::optional<TargetSize> size;
+  double size_begun = 1;           ///< of the target over the stated one, with which the solution began
   std::vector<SplitCheck> splits;  ///< of X, interleaved first; none where there are too few views
   double covariance_factor = 1;    ///< by which the splits have widened the covariance
   std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found
@@ -99,10 +102,14 @@ void tell_first(Calibration& calibration, std::string sentence, bool refuses = f
 bool has_pixels(const Calibration& calibration);
 
 /// What all calibrations start with: enough views, enough axes, numbering and planar poses chosen, a
-/// convention that closes. Returns the observations in use and fills `result` so far. Throws
-/// data::InputError.
+/// convention that closes. Returns the observations in use and fills `result` so far; where the target's size
+/// is to be solved for and is far from the stated one, both with poses of a target of
+/// Calibration::size_begun. Throws data::InputError.
 std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& observations,
                                  const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings);
+
+/// Poses of the target as they were given, where prepare() had them resized.
+void restore_size(Calibration& result);
 
 /// What all end with: views, observability, warnings. False where the answer is implausible, the first of
 /// them.

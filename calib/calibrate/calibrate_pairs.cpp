@@ -158,6 +158,15 @@ void tell_size(Calibration& result, const std::vector<PoseLoop>& loops, const Ca
   tell_first(result, text, depends && !settings.size_as_stated);
 }
 
+/// Few pairs do not tell a size beside their noise, but whether they close with another one.
+void tell_size_of_few(Calibration& result, const std::vector<Observation>& all,
+                      const CalibrateSettings& settings) {
+  if (result.size->wanted) return;
+  const auto sized =
+      check_size(result.setup, all, {Symmetry{}}, result.selection.robust_seed, settings.convention);
+  if (sized) tell_first(result, sized->sentence, !settings.size_as_stated);
+}
+
 /// Robot and target that are exchanged close as well, and so do both inverted. What tells it is where a
 /// camera can see a target: before it, and not far off its axis.
 void tell_unseen(Calibration& result, const std::vector<Observation>& observations) {
@@ -195,7 +204,8 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   const PoseSpaceFit fit = fit_pose_space(loops, seed);
   result.poses = fit.poses;
   result.covariance = result.repeatable = fit.covariance.topLeftCorner<6, 6>();
-  result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation}, {0.0}};
+  result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation.rms()}, {0.0}};
+  result.sight_noise = fit.translation;
   result.refined.converged = fit.converged;
   const std::vector<PoseLoop> compared = thinned(loops);
   result.comparison = compare_closed_forms(compared, settings.closed_forms);
@@ -216,7 +226,15 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   check_halves(result, loops, places);
   finish(result, observations);
   tell_size(result, loops, settings);
+  tell_size_of_few(result, all, settings);
   tell_unseen(result, observations);
+  result.size->estimate *= result.size_begun;
+  result.size->sd *= result.size_begun;
+  if (result.size->wanted) {
+    result.size->wanted->estimate *= result.size_begun;
+    result.size->wanted->sd *= result.size_begun;
+  }
+  restore_size(result);
   result.warnings.emplace_back(
       "pairs of poses tell the scatter alone: what the errors of an arm's model have in common is not in the "
       "stated standard deviations; pictures tell of it");

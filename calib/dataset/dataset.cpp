@@ -6,6 +6,7 @@
 #include <map>
 
 #include "calib/dataset/joint_list.h"
+#include "calib/dataset/picture_names.h"
 #include "calib/dataset/urdf_file.h"
 #include "data/camera/depth_map.h"
 #include "data/camera/intrinsics_file.h"
@@ -91,7 +92,7 @@ std::vector<fs::path> pose_files(const fs::path& folder, const std::string& begi
 std::vector<fs::path> pose_sources(const fs::path& folder) {
   std::vector<fs::path> sources;
   for (const char* name : {"poses", "pose", "robot_poses", "gripper"})
-    for (const char* ending : {".tum", ".csv", ".txt", ".json"})
+    for (const char* ending : {".tum", ".csv", ".txt", ".json", ".npz", ".npy"})
       if (fs::exists(folder / (std::string(name) + ending)))
         sources.push_back(folder / (std::string(name) + ending));
   for (const fs::path& place : folders_named(folder, "poses"))
@@ -135,13 +136,6 @@ std::string find_camera(const fs::path& folder) {
   return "";
 }
 
-/// Time in a file name that is nothing but a number: seconds, or nanoseconds.
-std::optional<double> time_in_name(const fs::path& path) {
-  std::optional<double> time = data::parse_number(path.stem().string());
-  if (!time || !std::isfinite(*time)) return std::nullopt;
-  return data::seconds_of(*time);
-}
-
 /// Pairs pictures with poses, by the poses' own word.
 class PosePairing {
  public:
@@ -163,6 +157,7 @@ class PosePairing {
   }
 
   bool by_time() const { return by_time_; }
+  bool by_number() const { return !by_time_ && !named_ && !in_order_; }
 
   /// place: of the picture among all, in order. Throws InputError where it has no pose.
   /// robot: whose joints the poses came as, or null.
@@ -183,6 +178,8 @@ class PosePairing {
       if (!number)
         throw InputError(image.string() + ": found no number in the file name, expected that of its pose");
       const auto entry = by_stamp_.find(static_cast<double>(*number));
+      if (const auto time = time_in_name(image); entry == by_stamp_.end() && time)
+        expect_one_clock(*time, by_stamp_.begin()->first, image.string(), source_);
       if (entry == by_stamp_.end())
         throw InputError(image.string() + ": no pose with number " + std::to_string(*number) + " in " +
                          source_ + " (" + std::to_string(poses_.size()) + " poses, " +
@@ -216,6 +213,7 @@ class PosePairing {
       frame.T_base_gripper = poses_[after->second].pose;
       return;
     }
+    expect_one_clock(*time, by_stamp_.begin()->first, image.string(), source_);
     if (after == by_stamp_.begin() || after == by_stamp_.end())
       throw InputError(image.string() + ": time " + data::format_number(*time) + " s lies outside of " +
                        source_ + " (" + data::format_number(by_stamp_.begin()->first) + " to " +
@@ -288,11 +286,12 @@ std::string choose_poses(const fs::path& folder, const DatasetOptions& options) 
   if (sources.empty() && pairs.size() == 1) return pairs.front().string();
   if (sources.empty()) {
     std::string instead;
-    for (const char* name : {"poses.yaml", "poses.yml", "poses.npz", "poses.npy"})
+    for (const char* name : {"poses.yaml", "poses.yml"})
       if (fs::exists(folder / name)) instead = std::string(": found ") + name + ", which is not read";
-    throw InputError(folder.string() + (instead.empty() ? std::string(": found no poses") : instead) +
-                     ", expected poses.tum, .csv, .txt or .json, or poses/*.yaml or *.txt, one pose a file "
-                     "(or name them)");
+    throw InputError(
+        folder.string() + (instead.empty() ? std::string(": found no poses") : instead) +
+        ", expected poses.tum, .csv, .txt, .json, .npz or .npy, or poses/*.yaml or *.txt, one pose a file "
+        "(or name them)");
   }
   if (sources.size() > 1)
     throw InputError(folder.string() + ": found poses in " + sources[0].filename().string() + " and in " +
@@ -344,11 +343,12 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
     poses = list.poses.size();
     if (list.in_order && poses != images.size())
       throw InputError(dataset.poses_path + ": found " + std::to_string(poses) +
-                       " poses without names or numbers for " + std::to_string(images.size()) +
-                       " pictures, expected one for each");
+                       " poses without names or numbers for " + std::to_string(images.size()) + " pictures" +
+                       kinds_of_names(images) + ", expected one for each");
     if (list.in_order) order_by_number(images);
     if (!list.guess.empty()) dataset.guesses.push_back(list.guess);
     pairing.emplace(std::move(list), dataset.poses_path);
+    if (pairing->by_number()) expect_one_picture_a_number(images);
   }
   std::vector<std::string> unpaired;
   for (std::size_t place = 0; place < images.size(); ++place) {

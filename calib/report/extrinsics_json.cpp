@@ -153,10 +153,15 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
     json["predicted_sd"]["repeatable_parent_deg"] = list(Eigen::Vector3d(kDegrees * here.tail<3>()));
   }
   const auto px = [&](double value) { return extrinsics.pixels ? Json(value) : Json(nullptr); };
+  const auto sight = [&](double SightNoise::*part) {
+    return calibration.sight_noise ? Json((*calibration.sight_noise).*part) : Json(nullptr);
+  };
   json["sigmas"] = {
       {"corner_px", px(extrinsics.corner_px)},
       {"robot_rotation_rad", extrinsics.robot_rotation_rad},
       {"robot_translation_m", extrinsics.robot_translation_m},
+      {"across_sight_m", sight(&SightNoise::across)},
+      {"along_sight_m", sight(&SightNoise::along)},
       {"depth_m", inputs.depth && inputs.depth->used ? Json(inputs.depth->sigma) : Json(nullptr)}};
   json["use"] = use_json(calibration);
   json["residuals"] = {{"reprojection_rms_px", px(calibration.chain_rms)},

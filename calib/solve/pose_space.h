@@ -8,6 +8,13 @@
 
 namespace flash::calib {
 
+/// Noise of places per axis, robot and camera together, about the camera's line of sight to the target [m].
+struct SightNoise {
+  double across = 0, along = 0;
+
+  double rms() const;  ///< over all three axes
+};
+
 /// X and Z where there are poses of the target, but no corners.
 struct PoseSpaceFit {
   HandEyePoses poses;
@@ -15,21 +22,25 @@ struct PoseSpaceFit {
                                ///< that is an unknown
   double size = 1;             ///< of the target, true over stated
   double rotation = 0;         ///< noise of the closed chain per axis, robot and camera together [rad]
-  double translation = 0;      ///< likewise [m]
+  SightNoise translation;
   bool converged = false;
 };
 
 /// The size of the target as an unknown.
 struct SizeUnknown {
   double prior_sd = std::numeric_limits<double>::infinity();  ///< of it, about the stated one
-  /// How much of the noise of places is the camera's. Noise makes lengths look larger than they are: a
-  /// robot's noise the target too large, a camera's too small. Pairs do not tell whose it is.
+  /// How much of the noise of places across the line of sight is the camera's; what there is more of along it
+  /// is all the camera's. Noise makes lengths look larger than they are: a robot's noise the target too
+  /// large, a camera's too small. Pairs do not tell whose it is.
   double camera_share = 0.5;
 };
 
-/// Minimises the sum over views of |dt|^2 / translation^2 + |dtheta|^2 / rotation^2, (dt, dtheta) the motion
-/// between the target as predicted, X^-1 G^-1 Z, and as seen, C; both noise levels by restricted maximum
-/// likelihood. Gauss and Newton. size: the target as seen is so many times as far away; none: it is as
+/// Minimises the sum over views of |dt - s s^T dt|^2 / across^2 + |s^T dt|^2 / along^2 + |dtheta|^2 /
+/// rotation^2, (dt, dtheta) the motion between the target as predicted, X^-1 G^-1 Z, and as seen, C; s the
+/// line of sight from the camera to the target as seen, in the frame of dt. A camera tells a distance worse
+/// than what lies across. The three noise levels are of restricted maximum likelihood, the ratio of the last
+/// two with a prior that few pairs feel. A target at the camera's origin has no line of sight: all of its dt
+/// counts as across. Gauss and Newton. size: the target as seen is so many times as far away; none: it is as
 /// stated.
 PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePoses& seed,
                             const std::optional<SizeUnknown>& size = {});

@@ -20,6 +20,20 @@ double surprise(const NoisePrior& prior, std::size_t component, double sigma) {
   return prior.spread > 0 ? std::log(sigma / prior.usual[component]) / prior.spread : 0;
 }
 
+/// Likewise for a ratio.
+double surprise(const NoiseRatio& ratio, const std::vector<double>& sigmas) {
+  return std::log(sigmas[ratio.over] / (ratio.usual * sigmas[ratio.under])) / ratio.spread;
+}
+
+/// Components of which neither residuals nor another component tell anything.
+std::vector<bool> untold(const LinearModel& model) {
+  std::vector<bool> result(static_cast<std::size_t>(model.components), true);
+  for (const GramBlock& block : model.blocks)
+    if (block.count > 0) result[static_cast<std::size_t>(block.component)] = false;
+  for (const NoiseRatio& ratio : model.noise.ratios) result[ratio.over] = result[ratio.under] = false;
+  return result;
+}
+
 /// d(deviance) / d(log sigma) for each component.
 Eigen::VectorXd gradient_of(const LinearModel& model, const LinearSolution& solution,
                             const std::vector<double>& sigmas) {
@@ -31,6 +45,11 @@ Eigen::VectorXd gradient_of(const LinearModel& model, const LinearSolution& solu
       gradient[c] += 2 *
                      surprise(model.noise, static_cast<std::size_t>(c), sigmas[static_cast<std::size_t>(c)]) /
                      model.noise.spread;
+  }
+  for (const NoiseRatio& ratio : model.noise.ratios) {
+    const double pull = 2 * surprise(ratio, sigmas) / ratio.spread;
+    gradient[static_cast<Eigen::Index>(ratio.over)] += pull;
+    gradient[static_cast<Eigen::Index>(ratio.under)] -= pull;
   }
   return gradient;
 }
@@ -119,6 +138,8 @@ LinearSolution solve_linear(const LinearModel& model, const std::vector<double>&
     solution.deviance += inverse_variance[static_cast<std::size_t>(c)] * solution.squares[c];
   for (std::size_t c = 0; c < sigmas.size(); ++c)
     solution.deviance += std::pow(surprise(model.noise, c, sigmas[c]), 2);
+  for (const NoiseRatio& ratio : model.noise.ratios)
+    solution.deviance += std::pow(surprise(ratio, sigmas), 2);
   if (model.prior.size() > 0) {
     const Eigen::VectorXd x = solution.shared.homogeneous();
     solution.deviance += x.dot(model.prior * x);
@@ -130,10 +151,7 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
                                                 const std::vector<double>& floor) {
   VarianceComponents result;
   result.sigmas = scaled(start, Eigen::VectorXd::Zero(model.components), floor);
-  std::vector<double> counts(start.size(), 0);
-  for (const GramBlock& block : model.blocks)
-    counts[static_cast<std::size_t>(block.component)] += block.count;
-
+  const std::vector<bool> absent = untold(model);
   LinearSolution here = solve_linear(model, result.sigmas);
   Eigen::MatrixXd hessian = Eigen::MatrixXd::Identity(model.components, model.components);
   for (; result.iterations < 50; ++result.iterations) {
@@ -141,12 +159,12 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
     hessian = hessian_of(model, result.sigmas);
     for (Eigen::Index c = 0; c < gradient.size(); ++c) {
       const auto i = static_cast<std::size_t>(c);
-      const bool absent = counts[i] == 0, at_floor = result.sigmas[i] <= floor[i] && gradient[c] > 0;
-      if (!absent && !at_floor) continue;
+      const bool at_floor = result.sigmas[i] <= floor[i] && gradient[c] > 0;
+      if (!absent[i] && !at_floor) continue;
       gradient[c] = 0;
       hessian.row(c).setZero();
       hessian.col(c).setZero();
-      hessian(c, c) = absent ? 1e12 : 1;
+      hessian(c, c) = absent[i] ? 1e12 : 1;
     }
     // Newton's step, downhill whatever the curvature, at most a factor e^2 a component.
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian);

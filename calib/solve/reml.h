@@ -12,11 +12,19 @@ struct GramBlock {
   Eigen::MatrixXd gram;  ///< [J_d J_s r_0]^T [J_d J_s r_0]
 };
 
+/// What is known beforehand of how one standard deviation compares with another: log-normal about `usual`,
+/// `spread` of the logarithm.
+struct NoiseRatio {
+  std::size_t over = 0, under = 0;  ///< components
+  double usual = 1, spread = 1;
+};
+
 /// What is known of standard deviations beforehand: log-normal about `usual`, `spread` of the logarithm; 0:
 /// nothing.
 struct NoisePrior {
   std::vector<double> usual = {};  ///< of each component
   double spread = 0;
+  std::vector<NoiseRatio> ratios = {};
 };
 
 /// A mixed linear model in the form that any standard deviations can be put to.
@@ -50,7 +58,7 @@ struct VarianceComponents {
 
 /// Restricted maximum likelihood (Patterson and Thompson 1971). Its equations, squares = redundancy sigma^2
 /// for each component, are also the fixed point of Helmert's and Foerstner's iterations; here Newton's method
-/// on log sigma. Components without residuals keep their start; none falls below `floor`.
+/// on log sigma. Components without residuals and without a ratio keep their start; none falls below `floor`.
 VarianceComponents estimate_variance_components(const LinearModel& model, const std::vector<double>& start,
                                                 const std::vector<double>& floor);
 

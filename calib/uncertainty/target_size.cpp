@@ -28,7 +28,7 @@ bool told(const Refinement& refined, const BundleSettings& settings, const std::
 }
 
 /// The solution with nothing known of the sizes; none where the data do not tell them.
-std::optional<Refinement> without_prior(Refinement refined, RefineSettings settings) {
+std::optional<Refinement> without_prior(Refinement refined, RefineSettings settings, double begun) {
   settings.estimate_pivots = false;
   settings.noise = refined.noise;
   settings.bundle.unknowns.scales = true;
@@ -38,8 +38,8 @@ std::optional<Refinement> without_prior(Refinement refined, RefineSettings setti
   // solved.
   if (!told(refined, settings.bundle, columns, 1)) return std::nullopt;
   Refinement scaled = refine(refined.bundle, settings);
-  const bool measured =
-      std::all_of(scaled.bundle.scales.begin(), scaled.bundle.scales.end(), measurable_size);
+  const bool measured = std::all_of(scaled.bundle.scales.begin(), scaled.bundle.scales.end(),
+                                    [begun](double size) { return measurable_size(size / begun); });
   if (!measured || !told(scaled, settings.bundle, columns, 100)) return std::nullopt;
   return scaled;
 }
@@ -52,7 +52,7 @@ bool TargetSize::far_off() const {
          std::abs(wanted->estimate - 1) > kFar * std::hypot(wanted->sd, prior_sd);
 }
 
-SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings) {
+SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings, double begun) {
   const bool unknown = settings.bundle.unknowns.scales;
   const PoseErrorModel errors = fit_pose_errors(refined, settings.bundle);
   SizedRefinement result{std::move(refined), {}, {}};
@@ -65,7 +65,7 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
     result.refined = refine(std::move(result.refined.bundle), again);
     result.systematic = systematic_uncertainty(result.refined, settings.bundle, errors);
   }
-  const std::optional<Refinement> free = without_prior(result.refined, settings);
+  const std::optional<Refinement> free = without_prior(result.refined, settings, begun);
   Unknowns with_scales = settings.bundle.unknowns;
   with_scales.scales = true;
   const Bundle& bundle = result.refined.bundle;

@@ -7,7 +7,8 @@
 
 namespace flash::calib {
 
-/// Over the stated one, what a solution looks for: one that starts farther off tends to zero or infinity.
+/// Over that which a solution begins with, what a solution looks for: one that starts farther off tends to
+/// zero or infinity.
 constexpr bool measurable_size(double size) { return size > 0.5 && size < 2; }
 
 /// What pictures and robot tell of the size of a target, over the size stated. It moves the camera by as
@@ -37,8 +38,9 @@ struct SizedRefinement {
 
 /// The size as one more unknown beside its prior. Errors that views share make pictures look surer of it than
 /// they are: the prior weighs more by as much as they add to its deviation, so that both count by their whole
-/// variances. refined: the solution where it does not; settings: those it was made with.
-SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings);
+/// variances. refined: the solution where it does not; settings: those it was made with; begun: sizes that it
+/// began with.
+SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings, double begun = 1);
 
 /// Covariance of the shared unknowns that comes of sizes that are kept as stated, each known to `sd` of it:
 /// how they follow a size, times what it may be off. By what pictures want beyond that and their own

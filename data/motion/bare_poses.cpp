@@ -53,6 +53,36 @@ std::vector<Row> joined(std::vector<Row> rows, const std::string& path) {
   return whole;
 }
 
+/// Whether rows are 4 x 4 matrices side by side: the last of four lines is 0 0 0 1 again and again, and the
+/// first three hold columns of length one.
+bool are_side_by_side(const std::vector<Row>& rows) {
+  if (rows.size() != 4) return false;
+  const std::size_t width = rows.front().size();
+  for (const Row& row : rows)
+    if (row.size() != width) return false;
+  if (width < 8 || width % 4 != 0) return false;
+  for (std::size_t column = 0; column < width; ++column) {
+    const bool last = column % 4 == 3;
+    double squares = 0;
+    for (std::size_t i = 0; i < 3; ++i) squares += rows[i][column] * rows[i][column];
+    if (rows[3][column] != (last ? 1 : 0) || (!last && !(std::abs(std::sqrt(squares) - 1) < 0.1)))
+      return false;
+  }
+  return true;
+}
+
+/// Each of those matrices as one row.
+std::vector<Row> parted(const std::vector<Row>& rows) {
+  std::vector<Row> whole;
+  for (std::size_t first = 0; first < rows.front().size(); first += 4) {
+    whole.emplace_back();
+    for (const Row& row : rows)
+      whole.back().insert(whole.back().end(), row.begin() + static_cast<std::ptrdiff_t>(first),
+                          row.begin() + static_cast<std::ptrdiff_t>(first + 4));
+  }
+  return whole;
+}
+
 bool are_quaternions(const std::vector<Row>& rows, std::size_t first) {
   return std::all_of(rows.begin(), rows.end(), [first](const Row& row) {
     double squares = 0;
@@ -133,7 +163,11 @@ PoseList interpreted(const std::vector<Row>& rows, const std::vector<double>& st
 }  // namespace
 
 PoseList load_bare_poses(const std::string& path) {
-  return interpreted(joined(read_rows(path), path), {}, path);
+  const std::vector<Row> rows = read_rows(path);
+  if (!are_side_by_side(rows)) return interpreted(joined(rows, path), {}, path);
+  PoseList list = interpreted(parted(rows), {}, path);
+  list.guess += "; they stand as 4 x 4 matrices side by side";
+  return list;
 }
 
 PoseList load_bare_pose_files(const std::vector<std::string>& files, const std::string& folder) {

@@ -6,7 +6,8 @@
 
 namespace flash::data {
 
-/// Poses as numbers without a word on what they are, a pose a line (or a 4 x 4 matrix over four lines),
+/// Poses as numbers without a word on what they are, a pose a line (or a 4 x 4 matrix over four lines,
+/// or all of them side by side over four lines),
 /// parted by commas, semicolons or blanks:
 ///   16 or 12   a matrix, row by row
 ///   7          x y z qx qy qz qw

@@ -126,6 +126,8 @@ std::optional<long> number_in_name(const std::string& path) {
 PoseList load_pose_list(const std::string& path) {
   const std::string extension = lower_extension(path);
   if (extension == ".json") return load_json_poses(path);
+  if (extension == ".npz") return load_npz_poses(path);
+  if (extension == ".npy") return load_npy_poses(path);
   PoseList list;
   if (extension == ".samples") {
     for (const PosePair& pair : load_samples(path))

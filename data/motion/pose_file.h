@@ -33,7 +33,7 @@ struct PosePair {
 /// about fixed x, y, z [rad]; with the ending _deg in degrees), or rotvec_x rotvec_y rotvec_z [rad]. Throws
 /// InputError naming file and line: numbers missing, quaternions that are not unit to 1e-3, angles beyond a
 /// turn (degrees), translations of many metres (millimetres). Other numbers are bare (load_bare_poses). JSON
-/// as load_json_poses reads it; the robot's poses of `.samples`.
+/// as load_json_poses reads it; .npz and .npy (load_npz_poses); the robot's poses of `.samples`.
 PoseList load_pose_list(const std::string& path);
 
 /// Eight numbers a line parted by blanks, or a name that ends in .tum.

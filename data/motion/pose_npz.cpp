@@ -14,9 +14,11 @@ using Arrays = std::map<std::string, NumpyArray>;
 using Names = std::initializer_list<const char*>;
 
 /// As plain() writes them.
-constexpr Names kRobot = {"robot",        "gripper",      "effector",     "hand",
-                          "tbasegripper", "gripper2base", "tgripper2base"};
-constexpr Names kTarget = {"target", "tracking", "object", "board", "marker", "tcameratarget", "target2cam"};
+constexpr Names kRobot = {"robot",        "gripper",      "effector",      "hand",
+                          "tbasegripper", "gripper2base", "tgripper2base", "tbaseee",
+                          "tbasetool",    "tbaseflange",  "tbasehand"};
+constexpr Names kTarget = {"target",     "tracking",  "object",  "board",      "marker",     "tcameratarget",
+                           "target2cam", "tcamboard", "tcamtag", "tcammarker", "tcamtarget", "tcameraboard"};
 
 std::string plain(const std::string& name) {
   std::string text;
@@ -73,12 +75,18 @@ std::vector<std::vector<double>> joined(const std::vector<std::vector<double>>& 
   return rows;
 }
 
+/// The poses of a stack, as numbers; empty where it is none.
+std::vector<std::vector<double>> poses_in(const NumpyArray& array) {
+  for (const std::size_t width : {16, 12, 7})
+    if (std::vector<std::vector<double>> rows = rows_of(array, width); !rows.empty()) return rows;
+  return {};
+}
+
 /// The poses of one of the two stacks, as numbers; empty where there is none.
 std::vector<std::vector<double>> stack_of(const Arrays& arrays, Names names, const char* rotation,
                                           const char* place) {
   if (const NumpyArray* whole = find(arrays, names))
-    for (const std::size_t width : {16, 12, 7})
-      if (std::vector<std::vector<double>> rows = rows_of(*whole, width); !rows.empty()) return rows;
+    if (std::vector<std::vector<double>> rows = poses_in(*whole); !rows.empty()) return rows;
   const NumpyArray *R = find(arrays, {rotation}), *t = find(arrays, {place});
   if (R == nullptr || t == nullptr) return {};
   return joined(rows_of(*R, 9), rows_of(*t, 3));
@@ -90,10 +98,8 @@ bool is_of_poses(const std::string& name) {
   return holds(kRobot) || holds(kTarget) || holds(parts);
 }
 
-}  // namespace
-
-std::vector<PosePair> load_npz_pairs(const std::string& path) {
-  const Arrays named = load_npz(path);
+/// By the names that plain() gives them.
+Arrays renamed(const Arrays& named, const std::string& path) {
   Arrays arrays;
   for (const auto& [name, array] : named)
     if (!arrays.emplace(plain(name), array).second)
@@ -102,6 +108,47 @@ std::vector<PosePair> load_npz_pairs(const std::string& path) {
                        "expected each once");
   for (const auto& [name, array] : named)
     if (is_of_poses(plain(name))) expect_numbers(array, path, name);
+  return arrays;
+}
+
+PoseList in_order(const std::vector<std::vector<double>>& rows, const std::string& path) {
+  PoseList list;
+  list.in_order = true;
+  list.guess = path + ": its poses are taken to be in the order of the pictures";
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    list.poses.push_back(
+        {"", static_cast<double>(i), pose_of_numbers(rows[i], path, "pose " + std::to_string(i))});
+    distances.push_back(list.poses.back().pose.translation().stableNorm());
+  }
+  expect_metres(distances, path);
+  return list;
+}
+
+}  // namespace
+
+PoseList load_npz_poses(const std::string& path) {
+  const Arrays named = load_npz(path), arrays = renamed(named, path);
+  std::vector<std::vector<double>> rows = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base");
+  if (rows.empty() && arrays.size() == 1) rows = poses_in(arrays.begin()->second);
+  if (rows.empty())
+    throw InputError(path + ": found " + described(named) +
+                     ", expected poses of the gripper in the base (robot, poses), N x 4 x 4 or N x 7, or "
+                     "R_gripper2base and t_gripper2base");
+  return in_order(rows, path);
+}
+
+PoseList load_npy_poses(const std::string& path) {
+  const NumpyArray array = load_npy(path);
+  const std::vector<std::vector<double>> rows = poses_in(array);
+  if (rows.empty())
+    throw InputError(path + ": found " + described({{"an array", array}}) +
+                     ", expected poses of the gripper in the base, N x 4 x 4 or N x 7");
+  return in_order(rows, path);
+}
+
+std::vector<PosePair> load_npz_pairs(const std::string& path) {
+  const Arrays named = load_npz(path), arrays = renamed(named, path);
   const auto robot = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base"),
              target = stack_of(arrays, kTarget, "rtarget2cam", "ttarget2cam");
   if (robot.empty() || robot.size() != target.size())

@@ -16,6 +16,21 @@ namespace {
 
 constexpr double kReach = 10;  // [m]
 
+/// Why a matrix is no rotation.
+std::string not_a_rotation(const Eigen::Matrix3d& matrix) {
+  const Eigen::RowVector3d lengths = matrix.colwise().norm();
+  Eigen::Index worst = 0;
+  (lengths.array() - 1).abs().maxCoeff(&worst);
+  const std::string name = "column " + std::to_string(worst + 1);
+  if (!(std::abs(lengths[worst] - 1) < 1e-3))
+    return "found a matrix that is no rotation: its " + name + " has length " + format_short(lengths[worst]) +
+           " (R(0,0) is " + format_short(matrix(0, 0)) + "), expected 1";
+  if (matrix.determinant() < 0) return "found a matrix that mirrors (determinant -1), expected a rotation";
+  return "found a matrix that is no rotation: two of its columns have the product " +
+         format_short((matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff()) +
+         ", expected 0";
+}
+
 }  // namespace
 
 Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vector4d& xyzw,
@@ -31,9 +46,9 @@ Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vecto
 Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path, const std::string& where) {
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   const double off = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm();
-  if (!(off < 1e-3) || rotation.determinant() < 0 ||
-      (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6)
+  if ((matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6)
     throw input_error(path, where, "expected a rotation and a translation as 4 x 4, last row 0 0 0 1");
+  if (!(off < 1e-3) || rotation.determinant() < 0) throw input_error(path, where, not_a_rotation(rotation));
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
   pose.translation() = matrix.topRightCorner<3, 1>();

@@ -28,16 +28,19 @@ RecordedPose pose_of_line(const PoseTableLine& line) {
     pose.pose = pose_of(translation, {axis.x(), axis.y(), axis.z(), line.value("qw")}, line.path, where);
   } else {
     Eigen::Matrix3d rotation;
+    const bool kuka = line.has("a");
     if (line.has("rotvec_x")) {
       rotation = rotation_from_vector(line.vector({"rotvec_x", "rotvec_y", "rotvec_z"}));
     } else {
-      const bool degrees = line.has("rx_deg");
-      pose.angles = line.vector({"rx", "ry", "rz"}, degrees ? "_deg" : "") * (degrees ? M_PI / 180 : 1);
+      const bool degrees = kuka || line.has("rx_deg");
+      pose.angles =
+          (kuka ? line.vector({"a", "b", "c"}) : line.vector({"rx", "ry", "rz"}, degrees ? "_deg" : "")) *
+          (degrees ? M_PI / 180 : 1);
       if (!degrees && pose.angles->cwiseAbs().maxCoeff() > 2 * M_PI + 1e-6)
         throw input_error(line.path, where,
                           "angle of " + format_short(pose.angles->cwiseAbs().maxCoeff()) +
                               " rad is beyond a full turn (degrees? name the columns rx_deg ry_deg rz_deg)");
-      rotation = rotation_from_angles(*pose.angles);
+      rotation = rotation_from_angles(*pose.angles, kuka ? "ZYX" : "xyz");
     }
     pose.pose.linear() = rotation;
     pose.pose.translation() = translation;
@@ -60,7 +63,7 @@ void expect_columns(const Columns& columns, const std::string& path) {
                           (joints ? "; joints need --robot with their URDF" : ""));
   }
   if (!all({"qx", "qy", "qz", "qw"}) && !all({"rx", "ry", "rz"}) && !all({"rx_deg", "ry_deg", "rz_deg"}) &&
-      !all({"rotvec_x", "rotvec_y", "rotvec_z"}))
+      !all({"rotvec_x", "rotvec_y", "rotvec_z"}) && !all({"a", "b", "c"}))
     throw input_error(path, "header",
                       "found " + names_in(columns) +
                           ", and with them no rotation, expected qx,qy,qz,qw or rx,ry,rz or "
@@ -112,9 +115,6 @@ std::string column_name(const std::string& header) {
                                                              {"x_mm", "tx_mm"},
                                                              {"y_mm", "ty_mm"},
                                                              {"z_mm", "tz_mm"},
-                                                             {"a", "rx_deg"},  // KUKA's, about turning ZYX
-                                                             {"b", "ry_deg"},
-                                                             {"c", "rz_deg"},
                                                              {"roll", "rx"},
                                                              {"pitch", "ry"},
                                                              {"yaw", "rz"},

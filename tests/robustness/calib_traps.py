@@ -334,7 +334,7 @@ def traps():
                    "two poses")
         yield Trap(f"{other}: a pose that is no number", sound, poses_changed(with_no_number), 2, "poses.tum", "line 5")
         yield Trap(f"{other}: one pose 50 mm off", sound, poses_changed(one_moved), 0, "005.png: not used", used=15)
-        yield Trap(f"{other}: identical poses", sound, poses_changed(at_one_place), 2, "turns by no more than 0.00 deg")
+        yield Trap(f"{other}: identical poses", sound, poses_changed(at_one_place), 2, "the robot does not move in any row")
         yield Trap(f"{other}: Staubli's angles", sound, as_angles("rx,ry,rz", 1, angles=turning_xyz), 2, "--angles XYZ")
         yield Trap(f"{other}: Kawasaki's angles", sound,
                    as_angles("rx_deg,ry_deg,rz_deg", math.degrees(1), angles=turning_zyz), 2, "--angles ZYZ")

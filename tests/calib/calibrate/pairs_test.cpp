@@ -192,6 +192,47 @@ TEST(Pairs, OfATargetOfAnotherSizeAreToldItAndSolvedForIt) {
     }
 }
 
+// Where the size is solved for, what was stated is no reason to refuse, unless it is that of another unit.
+TEST(Pairs, OfATargetOfAnySizeAreSolvedForIt) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const double size : {0.1, 0.5, 3.0, 1000.0}) {
+      const HandEyeScene scene = noisy_scene(setup, 0.5, 0.5, 21);
+      std::vector<Observation> pairs = pairs_of(scene);
+      for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
+      const std::string said = data::input_error_of([&] { calibrate_pairs(setup, pairs); });
+      EXPECT_EQ(said.substr(0, 4), size > 20 ? "tran" : "the ") << size << said;
+      CalibrateSettings unknown;
+      unknown.target_size_sd = std::numeric_limits<double>::infinity();
+      if (size > 20) {
+        EXPECT_EQ(data::input_error_of([&] { calibrate_pairs(setup, pairs, unknown); }), said);
+        continue;
+      }
+      const Calibration solved = calibrate_pairs(setup, pairs, unknown);
+      EXPECT_TRUE(solved.usable) << size;
+      EXPECT_EQ(solved.used.size(), pairs.size()) << size;
+      EXPECT_LT(std::abs(solved.size->estimate - size), 4 * solved.size->sd) << size;
+      EXPECT_TRUE(within_999(solved, scene)) << size;
+      // Poses stay as they were given.
+      EXPECT_NEAR((solved.selection.observations[3].T_camera_target.front().translation() -
+                   pairs[3].T_camera_target.front().translation())
+                          .norm() /
+                      pairs[3].T_camera_target.front().translation().norm(),
+                  0, 1e-12);
+    }
+}
+
+// So few do not tell their noise and a size together.
+TEST(Pairs, OfWhichThereAreFewAreToldOfASizeThatClosesThem) {
+  const HandEyeScene scene = noisy_scene(Mount::eye_in_hand, 0.1, 0.1, 21);
+  std::vector<Observation> pairs = pairs_of(scene);
+  pairs.resize(6);
+  EXPECT_FALSE(tells_of_size(calibrate_pairs(Mount::eye_in_hand, pairs)));
+  for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= 0.8;
+  const Calibration result = calibrate_pairs(Mount::eye_in_hand, pairs);
+  EXPECT_TRUE(tells_of_size(result));
+  EXPECT_FALSE(result.usable);
+}
+
 // Prints are off by a percent or two.
 TEST(Pairs, OfATargetOfNearlyTheSizeStatedAreAnsweredForTheSizeThatTheyTell) {
   for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})

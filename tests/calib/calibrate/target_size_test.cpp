@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <limits>
 
 #include "calib/calibrate/calibrate.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/projection_check.h"
 #include "calib/solve/linearization.h"
+#include "data/files/error.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {
@@ -56,6 +58,21 @@ TEST_P(TargetSizes, SizeThatIsNotKnownIsMeasuredAndNoLongerMovesTheCamera) {
   const double distance = scene.settings.distance * 1e3;
   EXPECT_GT(millimetres_off(calibrated(scene, kStated), scene), 0.2 * 0.015 * distance);
   EXPECT_LT(millimetres_off(result, scene), 0.2 * 0.015 * distance);
+}
+
+// One that is far from what is stated is where the solution begins: nothing stated excludes it.
+TEST_P(TargetSizes, SizeThatIsNotKnownMayBeAny) {
+  for (const double size : {0.3, 4.0}) {
+    const HandEyeScene scene = scene_of(GetParam(), size, 5);
+    EXPECT_THROW(calibrated(scene), data::InputError) << size;
+    const Calibration result = calibrated(scene, std::numeric_limits<double>::infinity());
+    EXPECT_TRUE(result.usable) << size << ' ' << result.warnings.front();
+    EXPECT_EQ(result.used.size(), scene.observations.size()) << size;
+    EXPECT_LT(std::abs(result.size->estimate - size), 4 * result.size->sd) << size;
+    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5) << size;  // 99.9 % of chi-square, 6
+    EXPECT_LT(result.centre_rms, 2 * result.chain_rms) << size;
+  }
 }
 
 TEST_P(TargetSizes, ValidationIsForSizeWarpAndLensThatWereSolvedFor) {

@@ -80,6 +80,8 @@ TEST(Layouts, BarePosesAreReadAndTheReadingIsSaid) {
        "a matrix, row by row [m]; poses are in the order of the pictures"},
       {"poses.txt", "0 -1 0 0.1\n1 0 0 0.2\n0 0 1 0.3\n0 0 0 1\n\n1 0 0 0.4\n0 1 0 0.5\n0 0 1 0.6\n0 0 0 1\n",
        "a matrix, row by row"},
+      {"poses.csv", "0,-1,0,0.1,1,0,0,0.4\n1,0,0,0.2,0,1,0,0.5\n0,0,1,0.3,0,0,1,0.6\n0,0,0,1,0,0,0,1\n",
+       "matrices side by side"},
       {"robot_poses.csv", "0,-1,0,100,1,0,0,200,0,0,1,300\n1,0,0,400,0,1,0,500,0,0,1,600\n", "[mm]"},
   };
   for (const Case& c : cases) {
@@ -98,7 +100,7 @@ TEST(Layouts, HeadersOfManyProgramsAreRead) {
       {"x,y,z,rx,ry,rz\n0.1,0.2,0.3,0,0,1.5708\n0.4,0.5,0.6,0,0,0\n", "in the order of the pictures"},
       {"x,y,z,qw,qx,qy,qz\n0.1,0.2,0.3,0.7071068,0,0,0.7071068\n0.4,0.5,0.6,1,0,0,0\n",
        "in the order of the pictures"},
-      {"X,Y,Z,A,B,C\n0.1,0.2,0.3,0,0,90\n0.4,0.5,0.6,0,0,0\n", "in the order of the pictures"},
+      {"X,Y,Z,A,B,C\n0.1,0.2,0.3,90,0,0\n0.4,0.5,0.6,0,0,0\n", "in the order of the pictures"},
       {"\xEF\xBB\xBFimage;x;y;z;rx;ry;rz\na_9.png;0.1;0.2;0.3;0;0;1.5708\na_10.png;0.4;0.5;0.6;0;0;0\n", ""},
       {"filename,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\na_9.png,100,200,300,0,0,90\na_10.png,400,500,600,0,0,"
        "0\n",
@@ -314,6 +316,49 @@ TEST(Layouts, PictureWithoutAPoseIsLeftOutByName) {
   folder.write("poses.csv", "0.1,0.2,0.3,0,0,0\n");
   const std::string message = data::input_error_of([&] { load_dataset(folder / ""); });
   EXPECT_NE(message.find("1 poses without names or numbers for 2 pictures"), std::string::npos) << message;
+}
+
+// What a program drew of its pictures, under other names.
+TEST(Layouts, PicturesOfAProgramsOutputAreNamed) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  const std::string output = folder / "images/CalibratedResult9.png";
+  std::filesystem::copy_file(folder / "images/a_9.png", output);
+  folder.write("poses.tum", "9 0 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+  const std::string numbered = data::input_error_of([&] { load_dataset(folder / ""); });
+  EXPECT_NE(numbered.find("1 CalibratedResultN and 2 a_N, with the same numbers"), std::string::npos)
+      << numbered;
+  std::filesystem::remove(folder / "poses.tum");
+  folder.write("poses.csv", "0.1,0.2,0.3,0,0,1.5708\n0.4,0.5,0.6,0,0,0\n");
+  const std::string in_order = data::input_error_of([&] { load_dataset(folder / ""); });
+  EXPECT_NE(in_order.find("2 poses without names or numbers for 3 pictures (1 CalibratedResultN, 2 a_N)"),
+            std::string::npos)
+      << in_order;
+}
+
+TEST(Layouts, SimulatedTimeAndAWallClockAreNotMixed) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  std::filesystem::rename(folder / "images/a_9.png", folder / "images/685.125.png");
+  std::filesystem::rename(folder / "images/a_10.png", folder / "images/686.5.png");
+  folder.write("poses.tum", "1715408108.1 0 0 0 0 0 0 1\n1715408109.6 0 0 0 0 0 0 1\n");
+  const std::string said = data::input_error_of([&] { load_dataset(folder / ""); });
+  EXPECT_NE(said.find("685.125.png: found the time 685.125 s, and in "), std::string::npos) << said;
+  EXPECT_NE(said.find("simulated time"), std::string::npos) << said;
+}
+
+TEST(Layouts, MatricesThatAreNoRotationAreRefusedWithTheNumber) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  const auto said = [&](const std::string& first) {
+    folder.write("poses.csv", first + "\n1,0,0,0.4,0,1,0,0.5,0,0,1,0.6\n");
+    return data::input_error_of([&] { load_dataset(folder / ""); });
+  };
+  EXPECT_NE(said("0.988995,0,0,0,0,1,0,0,0,0,1,0").find("R(0,0) is 0.989"), std::string::npos)
+      << said("0.988995,0,0,0,0,1,0,0,0,0,1,0");
+  EXPECT_NE(said("-1,0,0,0,0,1,0,0,0,0,1,0").find("mirrors"), std::string::npos);
+  EXPECT_NE(said("1,0.1,0,0,0,0.994987,0,0,0,0,1,0").find("have the product 0.1"), std::string::npos)
+      << said("1,0.1,0,0,0,0.994987,0,0,0,0,1,0");
 }
 
 TEST(Layouts, NumbersThatAreNoPoseAreNamed) {

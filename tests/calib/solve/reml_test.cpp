@@ -109,6 +109,36 @@ TEST(VarianceComponents, DevianceIsMinusTwiceTheLogOfTheRestrictedLikelihood) {
   EXPECT_NEAR(fast(0.5, 2) - fast(0.9, 0.4), dense(0.5, 2) - dense(0.9, 0.4), 1e-8);
 }
 
+TEST(VarianceComponents, WithoutResidualsStandsInItsUsualRatioToTheOther) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  LinearModel model{.groups = 1, .components = 2, .own = 0, .shared = 1, .blocks = {}};
+  Eigen::MatrixXd rows(20, 2);
+  for (int j = 0; j < 20; ++j) rows.row(j) << 1, normal(random);
+  model.blocks = {{0, 0, 20, rows.transpose() * rows}};
+  const double alone = estimate_variance_components(model, {1, 5}, {1e-6, 1e-6}).sigmas[0];
+  model.noise.ratios = {{.over = 1, .under = 0, .usual = 3, .spread = 0.5}};
+  const VarianceComponents found = estimate_variance_components(model, {1, 5}, {1e-6, 1e-6});
+  EXPECT_TRUE(found.converged);
+  EXPECT_NEAR(found.sigmas[0], alone, 1e-5 * alone);  // what tells nothing pulls nothing
+  EXPECT_NEAR(found.sigmas[1], 3 * alone, 1e-5 * alone);
+}
+
+// The mode of a log-normal prior times the likelihood of n squares: n (1 - q / sigma^2) + d / spread^2 = 0,
+// d = log(sigma_1 / (usual sigma_0)), with a first component that hardly moves.
+TEST(VarianceComponents, RatioIsWeighedAsItsDensity) {
+  constexpr double kMany = 1e6, kFew = 10, kSpread = 0.5;
+  LinearModel model{.groups = 1, .components = 2, .own = 0, .shared = 1, .blocks = {}};
+  const Eigen::Matrix2d squares = Eigen::Vector2d(1e-12, 1).asDiagonal();  // [J r]^T [J r] for each residual
+  model.blocks = {{0, 0, kMany, kMany * squares}, {0, 1, kFew, kFew * squares}};
+  model.noise.ratios = {{.over = 1, .under = 0, .usual = 3, .spread = kSpread}};
+  const std::vector<double> sigmas = estimate_variance_components(model, {1, 1}, {1e-6, 1e-6}).sigmas;
+  const double pull = std::log(sigmas[1] / (3 * sigmas[0])) / (kSpread * kSpread);
+  EXPECT_NEAR(sigmas[0], 1, 1e-4);
+  EXPECT_NEAR(kFew * (1 - 1 / (sigmas[1] * sigmas[1])) + pull, 0, 1e-3);
+  EXPECT_GT(sigmas[1], 1.1);
+}
+
 TEST(VarianceComponents, MeanOfFewRepeatsHasTheVarianceOfStudentsDistribution) {
   for (const int count : {9, 16, 41}) {
     std::mt19937 random(4);

@@ -37,8 +37,8 @@ void expect_both(const std::vector<PosePair>& pairs) {
 
 TEST(PairsOfNumpy, AreReadAsMatrices) {
   const TemporaryFolder folder;
-  const std::vector<std::string> robots = {"robot", "gripper_poses", "T_base_gripper"},
-                                 targets = {"target", "Board", "T_camera_target"};
+  const std::vector<std::string> robots = {"robot", "gripper_poses", "T_base_ee"},
+                                 targets = {"target", "Board", "T_cam_board"};
   for (std::size_t i = 0; i < robots.size(); ++i)
     expect_both(load_pose_pairs(folder.write("pairs.npz", npz_text({{targets[i], {2, 4, 4}, kMatrices},
                                                                     {"ids", {2}, {7, 8}},
@@ -53,6 +53,22 @@ TEST(PairsOfNumpy, AreReadAsOpenCvTakesThem) {
                                                                   {"t_gripper2base", {2, 3, 1}, t},
                                                                   {"R_target2cam", {2, 3, 3}, R},
                                                                   {"t_target2cam", {2, 3}, t}}))));
+}
+
+TEST(PosesOfNumpy, AreTheRobotsOrTheOnlyArray) {
+  const TemporaryFolder folder;
+  for (const char* name : {"T_base_ee", "arr_0"}) {
+    const PoseList list = load_pose_list(folder.write("poses.npz", npz_text({{name, {2, 4, 4}, kMatrices}})));
+    ASSERT_EQ(list.poses.size(), 2U);
+    EXPECT_TRUE(list.in_order);
+    EXPECT_NEAR(list.poses[1].pose.linear()(0, 0), kMatrices[16], 1e-12);
+    EXPECT_NEAR(list.poses[1].pose.translation().y(), kMatrices[16 + 7], 1e-12);
+  }
+  const std::string said = input_error_of([&] {
+    load_pose_list(
+        folder.write("poses.npz", npz_text({{"a", {2, 4, 4}, kMatrices}, {"b", {2, 4, 4}, kMatrices}})));
+  });
+  EXPECT_NE(said.find("poses.npz: found a 2 x 4 x 4, b 2 x 4 x 4, expected"), std::string::npos) << said;
 }
 
 TEST(PairsOfNumpy, ThatAreNoneAreToldWhatWasFoundAndExpected) {
