@@ -142,10 +142,15 @@ Matrix6d covariance_of_size(const std::vector<PoseLoop>& loops, const HandEyePos
 void tell_size(Calibration& result, const std::vector<PoseLoop>& loops, const CalibrateSettings& settings) {
   const TargetSize& size = *result.size;
   if (!size.far_off()) return;
-  const Eigen::Isometry3d other =
-      fit_pose_space(resized(loops, size.wanted->estimate / size.estimate), result.poses).poses.X;
-  const Vector6d away = motion_between(result.poses.X, other);
-  const bool depends = away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_95_of_6;
+  const auto away_with = [&](double other) {
+    const PoseSpaceFit fit = fit_pose_space(resized(loops, other / size.estimate), result.poses);
+    return motion_between(result.poses.X, fit.poses.X);
+  };
+  const auto excluded = [&](const Vector6d& away) {
+    return away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_95_of_6;
+  };
+  const Vector6d away = away_with(size.wanted->estimate);
+  const bool depends = excluded(away) || excluded(away_with(1));
   if (settings.size_as_stated) result.covariance += away * away.transpose();
   char text[400];
   std::snprintf(

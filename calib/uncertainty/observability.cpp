@@ -45,7 +45,9 @@ RotationDiversity rotation_diversity(const std::vector<Eigen::Isometry3d>& poses
 
 std::string degeneracy(const RotationDiversity& diversity, double least) {
   char text[320];
-  if (diversity.spread[0] < least) {
+  // Turns that are small about all axes are not told apart by their shares.
+  constexpr double kMostly = 0.9;
+  if (diversity.spread[0] < least || (diversity.spread[1] < least && diversity.first_share < kMostly)) {
     std::snprintf(text, sizeof text,
                   "the gripper turns by no more than %.2f deg: neither rotation nor translation can be "
                   "determined; add views that tilt by 20 to 40 deg about two axes",
