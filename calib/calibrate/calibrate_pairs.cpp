@@ -167,8 +167,9 @@ void tell_size(Calibration& result, const std::vector<PoseLoop>& loops, const Ca
 void tell_size_of_few(Calibration& result, const std::vector<Observation>& all,
                       const CalibrateSettings& settings) {
   if (result.size->wanted) return;
-  const auto sized =
-      check_size(result.setup, all, {Symmetry{}}, result.selection.robust_seed, settings.convention);
+  ConventionSettings any = settings.convention;
+  any.suspicious = 0;  // a size that is off by a fifth still closes well
+  const auto sized = check_size(result.setup, all, {Symmetry{}}, result.selection.robust_seed, any);
   if (sized) tell_first(result, sized->sentence, !settings.size_as_stated);
 }
 

@@ -195,7 +195,7 @@ TEST(Pairs, OfATargetOfAnotherSizeAreToldItAndSolvedForIt) {
 // Where the size is solved for, what was stated is no reason to refuse, unless it is that of another unit.
 TEST(Pairs, OfATargetOfAnySizeAreSolvedForIt) {
   for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
-    for (const double size : {0.1, 0.5, 3.0, 1000.0}) {
+    for (const double size : {0.1, 0.45, 3.0, 1000.0}) {
       const HandEyeScene scene = noisy_scene(setup, 0.5, 0.5, 21);
       std::vector<Observation> pairs = pairs_of(scene);
       for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
