@@ -94,6 +94,7 @@ def outputs(options, folder):
             ([options.sim, "run", folder / "scene.json", "-o", folder / "out"], (0,)),
             ([options.sim, "bench", "--vertices", "20", "--envs", "1", "--steps", "2"], (0,)),
             ([options.calib, "validate", folder / "stands.samples", "--extrinsics", folder / "camera.json"], (0,)),
+            ([options.calib, "validate", folder / "camera.json", "--extrinsics", folder / "camera.json"], (0,)),
             ([options.calib, "validate", folder / "moved.samples", "--refit-target", "--extrinsics", folder / "camera.json"], (0,)),
             ([options.calib, "validate", folder / "moved.samples", "--extrinsics", folder / "camera.json"], (3,))):
         done = program.call(*words, "--json")
