@@ -21,10 +21,11 @@ std::string not_a_rotation(const Eigen::Matrix3d& matrix) {
   const Eigen::RowVector3d lengths = matrix.colwise().norm();
   Eigen::Index worst = 0;
   (lengths.array() - 1).abs().maxCoeff(&worst);
-  const std::string name = "column " + std::to_string(worst + 1);
+  const std::string place = std::to_string(worst);
   if (!(std::abs(lengths[worst] - 1) < 1e-3))
-    return "found a matrix that is no rotation: its " + name + " has length " + format_short(lengths[worst]) +
-           " (R(0,0) is " + format_short(matrix(0, 0)) + "), expected 1";
+    return "found a matrix that is no rotation: its column " + std::to_string(worst + 1) + " has length " +
+           format_short(lengths[worst]) + " (R(" + place + "," + place + ") is " +
+           format_short(matrix(worst, worst)) + "), expected 1";
   if (matrix.determinant() < 0) return "found a matrix that mirrors (determinant -1), expected a rotation";
   return "found a matrix that is no rotation: two of its columns have the product " +
          format_short((matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff()) +

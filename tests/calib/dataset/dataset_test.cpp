@@ -96,8 +96,9 @@ TEST(Dataset, PairsNeedNoPictures) {
   EXPECT_EQ(observations[0].pixels.cols(), 0);
   folder.write("pose_samples.json",
                "[[[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]], [[1,0,0,0],[0,1,0,0],[0,0,2,0],[0,0,0,1]]]]");
-  EXPECT_TRUE(contains(data::input_error_of([&] { load_dataset(folder / "pose_samples.json"); }),
-                       "pair 0: expected a rotation"));
+  EXPECT_TRUE(
+      contains(data::input_error_of([&] { load_dataset(folder / "pose_samples.json"); }),
+               "pair 0: found a matrix that is no rotation: its column 3 has length 2 (R(2,2) is 2)"));
 }
 
 TEST(Dataset, ErrorsAreOneLineThatNamesTheCause) {
