@@ -114,7 +114,8 @@ int run_export(const ExportOptions& options) {
 void add_export_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App* verb = app.add_subcommand(
-      "export", "Write a calibration as other programs read it, or put the camera into a robot's description");
+      "export",
+      "Write a calibration as other programs read it, or put the camera into a robot's description");
   verb->add_option("extrinsics", options->extrinsics, "What handeye wrote, as extrinsics.json")->required();
   verb->add_option("--to", options->to, "Format: urdf, xacro, tf, mjcf, usd, easy_handeye2 or opencv")
       ->required()

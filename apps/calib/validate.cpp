@@ -9,12 +9,14 @@
 #include "apps/calib/verbs.h"
 #include "apps/command_line/command_line.h"
 #include "apps/command_line/doubts_option.h"
+#include "apps/command_line/option_checks.h"
 #include "apps/command_line/result_files.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/cloud_check.h"
 #include "calib/check/contradiction.h"
 #include "calib/check/projection_check.h"
 #include "calib/check/same_place.h"
+#include "calib/check/touch_check.h"
 #include "calib/report/overlay.h"
 #include "data/camera/posed_lens.h"
 #include "data/files/atomic_file.h"
@@ -35,6 +37,8 @@ struct ValidateOptions {
   std::string extrinsics;
   std::string lens;  ///< "stated", "solved", a file; empty: they have to agree
   bool refit_target = false;
+  std::string touched;
+  calib::TouchSettings touch;
   std::string out;
 };
 
@@ -63,7 +67,7 @@ std::vector<ValidatedView> views_of(const calib::Dataset& dataset, const calib::
 }
 
 constexpr const char *kResult = "validation.json", *kPattern = "pattern.png", *kProfile = "profile.png",
-                     *kPlacement = "placement.json";
+                     *kPlacement = "placement.json", *kTouched = "touched.json";
 
 std::string corner_path(const std::string& folder, const calib::Frame& frame) {
   return (fs::path(folder) / "corners" / (fs::path(frame.name).stem().string() + ".png")).string();
@@ -214,7 +218,57 @@ int run_placement(const ValidateOptions& options) {
   return exit_code;
 }
 
+/// Places that the tool touched against where the camera sees them.
+int run_touched(const ValidateOptions& options) {
+  if (!options.dataset.path.empty())
+    throw data::InputError("--touched: found " + options.dataset.path +
+                           " beside it, expected one of the two");
+  if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
+  const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
+  for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
+  const calib::TouchCheck found = calib::check_touched(
+      extrinsics, calib::load_touched_points(options.touched), options.touch, options.touched);
+  const int exit_code = found.contradicts || !extrinsics.usable ? exit_unusable : exit_done;
+  nlohmann::ordered_json json = {{"schema", "flash-touched/1"},
+                                 {"extrinsics", options.extrinsics},
+                                 {"touched", options.touched},
+                                 {"rms_px", found.rms_px},
+                                 {"rms_across_mm", 1e3 * found.rms_across},
+                                 {"expected_across_mm", 1e3 * found.expected_across},
+                                 {"chi_square", found.chi_square},
+                                 {"chance", found.chance},
+                                 {"contradicts", found.contradicts},
+                                 {"points", nlohmann::ordered_json::array()},
+                                 {"exit_code", exit_code}};
+  for (int axis = 0; axis < 3; ++axis) {
+    json["shift_mm"].push_back(1e3 * found.shift[axis]);
+    json["shift_sd_mm"].push_back(1e3 * found.shift_sd[axis]);
+  }
+  for (const calib::TouchedResidual& point : found.points)
+    json["points"].push_back(
+        {{"error_px", {point.error.x(), point.error.y()}}, {"across_mm", 1e3 * point.across}});
+  const std::string text = data::format_json(json) + '\n';
+  if (!options.out.empty()) data::write_atomically((fs::path(options.out) / kTouched).string(), text);
+  if (options.common.json) {
+    std::cout << text;
+  } else {
+    for (std::size_t i = 0; i < found.points.size(); ++i)
+      std::printf("point %zu: (%.2f, %.2f) px, %.2f mm across the line of sight\n", i + 1,
+                  found.points[i].error.x(), found.points[i].error.y(), 1e3 * found.points[i].across);
+    std::printf("%s\n", calib::describe(found).c_str());
+  }
+  if (found.contradicts)
+    say_unusable(calib::describe(found), "the touched points contradict the calibration");
+  else if (!extrinsics.usable)
+    say_unusable(options.extrinsics + ": it ended with exit code 3", "the calibration cannot be used");
+  return exit_code;
+}
+
 int run_validate(const CLI::App& verb, ValidateOptions options) {
+  if (!options.touched.empty()) return run_touched(options);
+  if (options.dataset.path.empty())
+    throw data::InputError(
+        "dataset, --touched: found neither, expected a recording, or points that were touched");
   if (is_calibration(options.dataset.path)) {
     if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
     return run_placement(options);
@@ -295,6 +349,7 @@ void add_validate_verb(CLI::App& app, Action& action) {
       "validate",
       "Project the target through robot and calibration; lay the clouds of all views on each other");
   add_dataset_options(*verb, options->dataset);
+  verb->get_option("dataset")->required(false);
   verb->add_option("--extrinsics", options->extrinsics, "What flash-calib handeye has written")->required();
   verb->add_option(
           "--lens", options->lens,
@@ -303,12 +358,23 @@ void add_validate_verb(CLI::App& app, Action& action) {
       ->type_name("stated|solved|FILE");
   verb->add_flag("--refit-target", options->refit_target,
                  "The target stands elsewhere than at the calibration");
+  verb->add_option(
+          "--touched", options->touched,
+          "Points that the tool touched, in place of a recording: a table x,y,z,u,v of the tip in the "
+          "base [m] and its pixel in a picture of the camera")
+      ->type_name("FILE");
+  verb->add_option("--touch-sd", options->touch.touch_sd, "How well the tip's place is known, an axis [m]")
+      ->check(positive_number())
+      ->capture_default_str();
+  verb->add_option("--pixel-sd", options->touch.pixel_sd, "How well its pixel is known, an axis [px]")
+      ->check(positive_number())
+      ->capture_default_str();
   verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");
   add_calib_common_options(*verb, options->common);
   add_doubts_option(*verb, options->despite_doubts, "Use a calibration that handeye ended with exit code 3");
   verb->footer(
       "In place of a recording it takes what handeye has written of a later one, and says whether the "
-      "camera stands where it did.\n"
+      "camera stands where it did. With --touched it takes points instead.\n"
       "Exit code 3: these views are missed by three times what the calibration states, the camera has moved, "
       "or the calibration cannot be used.\n"
       "Example:\n"

@@ -25,8 +25,7 @@ std::string without_camera(std::string text, const std::string& path, const std:
     throw input_error(path, camera,
                       "found one of the comments \"" + first + "\" and \"" + last + "\", expected both");
   const std::size_t line = text.rfind('\n', begin), after = end + last.size();
-  return text.erase(line == std::string::npos ? 0 : line,
-                    after - (line == std::string::npos ? 0 : line));
+  return text.erase(line == std::string::npos ? 0 : line, after - (line == std::string::npos ? 0 : line));
 }
 
 /// Throws unless the text is XML whose root has this name.
@@ -36,8 +35,8 @@ void parse(const std::string& text, const std::string& path, const std::string& 
     throw data::InputError(path + ": is no XML: line " + std::to_string(document.ErrorLineNum()));
   const tinyxml2::XMLElement* const element = document.RootElement();
   if (element == nullptr || root != element->Name())
-    throw data::InputError(path + ": found <" + (element == nullptr ? "" : element->Name()) + ">, expected <" +
-                           root + ">");
+    throw data::InputError(path + ": found <" + (element == nullptr ? "" : element->Name()) +
+                           ">, expected <" + root + ">");
 }
 
 std::string name_of(const tinyxml2::XMLElement& element) {
@@ -46,7 +45,8 @@ std::string name_of(const tinyxml2::XMLElement& element) {
 }
 
 /// The names of all elements of a kind, those inside of others too.
-void add_names(const tinyxml2::XMLElement& element, const std::string& kind, std::vector<std::string>& names) {
+void add_names(const tinyxml2::XMLElement& element, const std::string& kind,
+               std::vector<std::string>& names) {
   for (const auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) {
     if (kind == child->Name()) names.push_back(name_of(*child));
     add_names(*child, kind, names);
@@ -78,8 +78,10 @@ std::string marked(const std::string& block, const std::string& camera, const st
 void expect_free(const std::vector<std::string>& names, const std::string& path, const std::string& kind,
                  const std::string& camera) {
   if (contains(names, camera))
-    throw input_error(path, kind,
-                      "found \"" + camera + "\", which flash-calib did not write, expected none: give it another with --child-frame");
+    throw input_error(
+        path, kind,
+        "found \"" + camera +
+            "\", which flash-calib did not write, expected none: give it another with --child-frame");
 }
 
 std::size_t end_of_tag(const std::string& text, std::size_t begin) {
@@ -153,10 +155,11 @@ std::string camera_in_mjcf(const std::string& text, const std::string& path,
   std::size_t n = 0;
   while (!of_world && n < bodies.size() && bodies[n] != transform.parent) ++n;
   if (!of_world && n == bodies.size())
-    throw input_error(path, "body",
-                      "found " + listed(bodies) + ", expected \"" + transform.parent +
-                          "\", on which the camera is: name it as the robot does with --parent-frame; world is the "
-                          "worldbody");
+    throw input_error(
+        path, "body",
+        "found " + listed(bodies) + ", expected \"" + transform.parent +
+            "\", on which the camera is: name it as the robot does with --parent-frame; world is the "
+            "worldbody");
   const std::size_t place = behind_tag(robot, of_world ? "worldbody" : "body", n);
   if (place == std::string::npos)
     throw input_error(path, of_world ? "worldbody" : "body " + transform.parent,

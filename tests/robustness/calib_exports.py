@@ -39,13 +39,6 @@ def product(a, b):
     return [[sum(a[i][k] * b[k][j] for k in range(len(b))) for j in range(len(b[0]))] for i in range(len(a))]
 
 
-def rotation_of(q):
-    x, y, z, w = q
-    return [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
-
-
 def near(a, b, most=1e-6):
     flat = lambda value: [x for item in value for x in flat(item)] if isinstance(value, (list, tuple)) else [value]
     return all(abs(x - y) < most for x, y in zip(flat(a), flat(b), strict=True))
@@ -92,7 +85,7 @@ def of_mjcf(calib, work, truth):
     yield camera is not None, "mjcf: the camera is not in the body"
     w, x, y, z = numbers(camera.get("quat"))
     backwards = [[1, 0, 0], [0, -1, 0], [0, 0, -1]]
-    yield near(numbers(camera.get("pos")), truth["t"]) and near(product(rotation_of((x, y, z, w)), backwards), truth["R"]), \
+    yield near(numbers(camera.get("pos")), truth["t"]) and near(product(program.rotation_of((x, y, z, w)), backwards), truth["R"]), \
         "mjcf: another transform"
     try:
         import mujoco
@@ -180,7 +173,7 @@ def main():
         program.must(options.calib, "handeye", work / "set", "-o", file)
         answer = json.loads(file.read_text())
         transform = answer["transform"]
-        truth = {"file": file, "t": transform["translation"], "R": rotation_of(transform["rotation_xyzw"]), "lens": answer["lens"],
+        truth = {"file": file, "t": transform["translation"], "R": program.rotation_of(transform["rotation_xyzw"]), "lens": answer["lens"],
                  "parent": transform["parent"]}
         results = [row for check in (of_urdf, of_mjcf, of_usd, refused) for row in check(options.calib, work, truth)]
         for kind in ("tf", "easy_handeye2", "opencv"):

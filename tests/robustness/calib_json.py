@@ -36,6 +36,10 @@ def outputs(calib, work):
     form = lambda pose: {"translation": dict(zip("xyz", pose[:3])), "rotation": dict(zip("xyzw", pose[3:]))}
     (work / "pairs.samples").write_text(json.dumps({"samples": [
         {"robot": form(view["base_gripper"]), "tracking": form(view["camera_target"])} for view in solved if view["used"]]}))
+    left = json.loads((work / "left/camera.json").read_text())
+    (cx, cy), place = left["lens"]["centre_px"], left["transform"]["translation"]
+    ahead = [place[i] + row[2] for i, row in enumerate(program.rotation_of(left["transform"]["rotation_xyzw"]))]  # a metre before the camera
+    (work / "touched.csv").write_text("x,y,z,u,v\n" + ",".join(map(str, (*ahead, cx, cy))) + "\n")
     for words in (("handeye", work / "pairs.samples", "--setup", "eye-to-hand"),
                   ("register", work / "left/camera.json", work / "right/camera.json", "--workspace", "0.4,0,0.1", *cache),
                   ("register", work / "left/camera.json", work / "right/camera.json", "--without-images"),
@@ -43,6 +47,7 @@ def outputs(calib, work):
                   ("validate", work / "pairs.samples", "--extrinsics", work / "left/camera.json"),
                   ("plan", work / "wrist", "--count", "2", *cache), ("intrinsics", work / "wrist", *cache),
                   ("detect", work / "wrist", *cache),
+                  ("validate", "--touched", work / "touched.csv", "--extrinsics", work / "left/camera.json"),
                   ("export", work / "wrist/camera.json", "--to", "usd", "-o", work / "camera.usda")):
         yield " ".join(map(str, words[:2])), program.must(calib, *words, "--json").stdout
 

@@ -28,6 +28,14 @@ def conclude(results):
     return 1 if wrong else 0
 
 
+def rotation_of(q):
+    """The matrix of a unit quaternion x y z w."""
+    x, y, z, w = q
+    return [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+
+
 def synthesize(sysid, folder, *options):
     """An asset and a recording of it, a short corner lift."""
     folder.mkdir(parents=True, exist_ok=True)

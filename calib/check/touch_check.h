@@ -1,0 +1,53 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calib/calibrate/extrinsics.h"
+
+namespace flash::calib {
+
+/// A place that the robot's tool touched, and where the camera sees it.
+struct TouchedPoint {
+  Eigen::Vector3d place;  ///< of the tip, in the base [m]
+  Eigen::Vector2d pixel;  ///< as in the picture, distorted [px]
+};
+
+/// Rows of a table with the header "x,y,z,u,v". Throws data::InputError naming file and line.
+std::vector<TouchedPoint> load_touched_points(const std::string& path);
+
+struct TouchSettings {
+  double touch_sd = 1e-3;  ///< of the tip an axis: how well its place is known [m]
+  double pixel_sd = 1;     ///< of a pixel an axis [px]
+};
+
+struct TouchedResidual {
+  Eigen::Vector2d error = Eigen::Vector2d::Zero();  ///< pixel less the projection of the place [px]
+  double across = 0;                                ///< of the place from the ray of the pixel [m]
+};
+
+struct TouchCheck {
+  std::vector<TouchedResidual> points;
+  double rms_px = 0, rms_across = 0;  ///< [px], [m]
+  double expected_across = 0;         ///< root mean square that calibration, tip and pixel make likely [m]
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();     ///< of the camera in the base, with which the points fit best [m]
+  Eigen::Vector3d shift_sd = Eigen::Vector3d::Zero();  ///< of that, by the points alone [m]
+  double chi_square = 0;  ///< of all errors, two a point
+  double chance = 1;      ///< that a right calibration would miss the points by more
+  bool contradicts = false;  ///< the chance is below 1 %
+};
+
+/// Residuals of places in the pictures of a camera beside the robot, against
+///
+///     S = J C J^T + diag(P touch_sd^2 P^T + pixel_sd^2 I),
+///
+/// C the covariance of the calibration, which all points share, J and P the derivatives of a pixel by the
+/// camera's pose and by the place. The distance across the ray is at the depth of the place. Throws
+/// data::InputError where the camera is on the gripper, has no lens, or a place lies behind it.
+TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<TouchedPoint>& points,
+                         const TouchSettings& settings, const std::string& path);
+
+/// "the points are missed by 1.2 mm across the line of sight (2.1 px), where 1.4 mm are expected ...".
+std::string describe(const TouchCheck& check);
+
+}  // namespace flash::calib
