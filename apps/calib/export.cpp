@@ -36,11 +36,13 @@ std::string exported(const ExportOptions& options, const calib::Extrinsics& extr
   const data::NamedTransform& transform = extrinsics.transform;
   const calib::Lens& lens = extrinsics.lens;
   if (options.to == "tf") return calib::ros_static_transform(transform, lens);
-  if (options.to == "easy_handeye2") return calib::easy_handeye2(transform, extrinsics.setup, lens);
+  if (options.to == "easy_handeye2")
+    return calib::easy_handeye2(transform, extrinsics.setup, lens, extrinsics.target_pose.parent);
   if (options.to == "mjcf") return calib::mjcf_camera(transform, lens);
   if (options.to == "usd") return calib::usd_stage(transform, lens);
   if (options.to == "opencv") return calib::opencv_yaml(transform, lens);
-  return "<link name=\"" + transform.child + "\"/>\n" + calib::urdf_joint(transform, lens);
+  return "<?xml version=\"1.0\"?>\n<robot name=\"" + transform.child + "\">\n<link name=\"" +
+         transform.child + "\"/>\n" + calib::urdf_joint(transform, lens) + "</robot>\n";
 }
 
 // What the format has no words for.
@@ -49,10 +51,21 @@ std::vector<std::string> not_expressed(const ExportOptions& options, const calib
   const bool renders = options.to == "mjcf" || options.to == "usd";
   if (!extrinsics.lens)
     lines.emplace_back("a lens: the calibration is of pairs of poses, which have none");
+  else if (options.to != "opencv" && !renders)
+    lines.emplace_back("the lens, but in a comment");
   else if (renders && extrinsics.lens->model != data::DistortionModel::none)
     lines.emplace_back("the distortion of the lens: undistort the pictures of the camera");
   lines.emplace_back("the covariance of the transform, which is in " + options.extrinsics);
   return lines;
+}
+
+// What a link leads to, which is changed in its place.
+std::string file_to_change(const std::string& path) {
+  const fs::path file = fs::canonical(path);
+  const bool writable = (fs::status(file).permissions() & fs::perms::owner_write) != fs::perms::none;
+  if (!fs::is_regular_file(file) || !writable)
+    throw data::InputError(path + ": cannot be changed, expected a file that may be written to");
+  return file.string();
 }
 
 // Beside the file, under the first name that is free: an earlier backup stays.
@@ -70,20 +83,26 @@ int run_export(const ExportOptions& options) {
   if (changes && options.to != "urdf" && options.to != "xacro" && options.to != "mjcf")
     throw data::InputError("--into: found --to " + options.to + ", expected urdf, xacro or mjcf");
   if (!changes) data::check_file_free(options.out, options.common.force);
-  expect_own_files({options.out}, {options.extrinsics});
+  expect_own_files({options.out}, {options.extrinsics, options.into});
   calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
   if (!options.parent.empty()) extrinsics.transform.parent = options.parent;
   if (!options.child.empty()) extrinsics.transform.child = options.child;
   expect_frame_names(extrinsics.transform.parent, extrinsics.transform.child);
+  if (options.to == "easy_handeye2" && extrinsics.target_pose.parent == extrinsics.transform.parent)
+    throw data::InputError("--parent-frame: found " + options.parent +
+                           ", which is the robot's other frame, expected the one that carries the camera");
   for (const std::string& warning : extrinsics.warnings) warn_calib(warning);
 
   std::string backup;
   if (changes) {
     const std::string was = data::read_file(options.into);
+    const std::string file = file_to_change(options.into);
     const auto with_camera = options.to == "mjcf" ? calib::camera_in_mjcf : calib::camera_in_urdf;
     const std::string is = with_camera(was, options.into, extrinsics.transform, extrinsics.lens);
-    backup = backup_path(options.into);
-    data::write_together({{backup, was}, {options.into, is}});
+    backup = backup_path(file);
+    const fs::perms permissions = fs::status(file).permissions();
+    data::write_together({{backup, was}, {file, is}});
+    for (const std::string& path : {backup, file}) fs::permissions(path, permissions);
   } else {
     data::write_atomically(options.out, exported(options, extrinsics));
   }

@@ -277,7 +277,8 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
         {report, html},
         {options.ros, calib::ros_static_transform(extrinsics.transform, extrinsics.lens)},
         {options.urdf, calib::urdf_joint(extrinsics.transform, extrinsics.lens)},
-        {options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup, extrinsics.lens)}};
+        {options.easy_handeye2,
+         calib::easy_handeye2(extrinsics.transform, setup, extrinsics.lens, extrinsics.target_pose.parent)}};
     if (extrinsics.pixels)
       files.push_back({options.camera_info,
                        data::camera_info_text(solved.calibration.refined.bundle.intrinsics.front())});

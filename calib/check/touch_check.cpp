@@ -42,8 +42,8 @@ std::vector<TouchedPoint> load_touched_points(const std::string& path) {
   data::LineReader lines(text);
   std::string_view line;
   if (!lines.next(line) || line != kHeader)
-    throw data::input_error(path, "line 1",
-                            "expected the header " + std::string(kHeader) + ", metres in the base and pixels");
+    throw data::input_error(
+        path, "line 1", "expected the header " + std::string(kHeader) + ", metres in the base and pixels");
   std::vector<TouchedPoint> points;
   while (lines.next(line)) {
     if (line.empty()) continue;
@@ -56,9 +56,9 @@ std::vector<TouchedPoint> load_touched_points(const std::string& path) {
       if (sound) values[static_cast<Eigen::Index>(k)] = *value;
     }
     if (!sound)
-      throw data::input_error(path, "line " + std::to_string(lines.number()),
-                              "found \"" + std::string(line) + "\", expected five numbers, " +
-                                  std::string(kHeader));
+      throw data::input_error(
+          path, "line " + std::to_string(lines.number()),
+          "found \"" + std::string(line) + "\", expected five numbers, " + std::string(kHeader));
     points.push_back({values.head<3>(), values.tail<2>()});
   }
   if (points.empty()) throw data::input_error(path, "line 2", "missing, expected at least one point");
@@ -76,7 +76,8 @@ TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<Touched
   const auto count = static_cast<Eigen::Index>(points.size());
   TouchCheck check;
   Eigen::VectorXd errors(2 * count);
-  Eigen::MatrixXd by_pose(2 * count, 6), by_shift(2 * count, 3), noise = Eigen::MatrixXd::Zero(2 * count, 2 * count);
+  Eigen::MatrixXd by_pose(2 * count, 6), by_shift(2 * count, 3),
+      noise = Eigen::MatrixXd::Zero(2 * count, 2 * count);
   double depths = 0, likely = 0;
   for (Eigen::Index i = 0; i < count; ++i) {
     const TouchedPoint& point = points[static_cast<std::size_t>(i)];
@@ -100,8 +101,9 @@ TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<Touched
     check.rms_px += errors.segment<2>(2 * i).squaredNorm() / static_cast<double>(count);
     check.rms_across += across * across / static_cast<double>(count);
     const double metres = place.z() / std::sqrt(lens.fx * lens.fy);  // a pixel
-    const Eigen::Matrix2d own = noise.block<2, 2>(2 * i, 2 * i) + by_pose.middleRows<2>(2 * i) * extrinsics.covariance *
-                                                                      by_pose.middleRows<2>(2 * i).transpose();
+    const Eigen::Matrix2d own =
+        noise.block<2, 2>(2 * i, 2 * i) +
+        by_pose.middleRows<2>(2 * i) * extrinsics.covariance * by_pose.middleRows<2>(2 * i).transpose();
     likely += metres * metres * own.trace() / static_cast<double>(count);
     depths += place.z() / static_cast<double>(count);
   }
@@ -125,13 +127,15 @@ TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<Touched
 
 std::string describe(const TouchCheck& check) {
   char text[400];
-  std::snprintf(text, sizeof text,
-                "the touched points are missed by %.2f mm across the line of sight (%.2f px) where about %.2f mm are "
-                "expected; a right calibration would miss them by more with a chance of %.3g %%; they fit best with the "
-                "camera moved by (%.1f, %.1f, %.1f) +- (%.1f, %.1f, %.1f) mm",
-                1e3 * check.rms_across, check.rms_px, 1e3 * check.expected_across, 100 * check.chance,
-                1e3 * check.shift.x(), 1e3 * check.shift.y(), 1e3 * check.shift.z(), 1e3 * check.shift_sd.x(),
-                1e3 * check.shift_sd.y(), 1e3 * check.shift_sd.z());
+  std::snprintf(
+      text, sizeof text,
+      "the touched points are missed by %.2f mm across the line of sight (%.2f px) where about %.2f mm are "
+      "expected; a right calibration would miss them by more with a chance of %.3g %%; they fit best with "
+      "the "
+      "camera moved by (%.1f, %.1f, %.1f) +- (%.1f, %.1f, %.1f) mm",
+      1e3 * check.rms_across, check.rms_px, 1e3 * check.expected_across, 100 * check.chance,
+      1e3 * check.shift.x(), 1e3 * check.shift.y(), 1e3 * check.shift.z(), 1e3 * check.shift_sd.x(),
+      1e3 * check.shift_sd.y(), 1e3 * check.shift_sd.z());
   return text;
 }
 

@@ -30,10 +30,11 @@ struct TouchCheck {
   std::vector<TouchedResidual> points;
   double rms_px = 0, rms_across = 0;  ///< [px], [m]
   double expected_across = 0;         ///< root mean square that calibration, tip and pixel make likely [m]
-  Eigen::Vector3d shift = Eigen::Vector3d::Zero();     ///< of the camera in the base, with which the points fit best [m]
+  Eigen::Vector3d shift =
+      Eigen::Vector3d::Zero();  ///< of the camera in the base, with which the points fit best [m]
   Eigen::Vector3d shift_sd = Eigen::Vector3d::Zero();  ///< of that, by the points alone [m]
-  double chi_square = 0;  ///< of all errors, two a point
-  double chance = 1;      ///< that a right calibration would miss the points by more
+  double chi_square = 0;                               ///< of all errors, two a point
+  double chance = 1;         ///< that a right calibration would miss the points by more
   bool contradicts = false;  ///< the chance is below 1 %
 };
 

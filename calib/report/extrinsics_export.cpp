@@ -19,8 +19,8 @@ Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& R) {
 
 template <class... Values>
 std::string formatted(const char* format, const Values&... values) {
-  char text[1024];
-  std::snprintf(text, sizeof text, format, values...);
+  std::string text(static_cast<std::size_t>(std::snprintf(nullptr, 0, format, values...)), '\0');
+  std::snprintf(text.data(), text.size() + 1, format, values...);
   return text;
 }
 
@@ -71,9 +71,11 @@ std::string urdf_joint(const data::NamedTransform& transform, const Lens& lens) 
              transform.child.c_str(), t.x(), t.y(), t.z(), rpy.x(), rpy.y(), rpy.z());
 }
 
-std::string easy_handeye2(const data::NamedTransform& transform, Setup setup, const Lens& lens) {
+std::string easy_handeye2(const data::NamedTransform& transform, Setup setup, const Lens& lens,
+                          const std::string& other) {
   const Eigen::Matrix<double, 7, 1> v = data::to_vector(transform.T);
   const bool in_hand = setup == Setup::eye_in_hand;
+  const std::string other_frame = !other.empty() ? other : in_hand ? "base" : "gripper";
   return remark("# ", lens) +
          formatted(
              "parameters:\n  name: flash_calib\n  calibration_type: %s\n  robot_base_frame: %s\n"
@@ -81,9 +83,10 @@ std::string easy_handeye2(const data::NamedTransform& transform, Setup setup, co
              "  freehand_robot_movement: true\n"
              "transform:\n  translation: {x: %.9g, y: %.9g, z: %.9g}\n"
              "  rotation: {x: %.9g, y: %.9g, z: %.9g, w: %.9g}\n",
-             in_hand ? "eye_in_hand" : "eye_on_base", in_hand ? "base" : transform.parent.c_str(),
-             in_hand ? transform.parent.c_str() : "gripper", transform.child.c_str(), v[0], v[1], v[2], v[3],
-             v[4], v[5], v[6]);
+             in_hand ? "eye_in_hand" : "eye_on_base",
+             in_hand ? other_frame.c_str() : transform.parent.c_str(),
+             in_hand ? transform.parent.c_str() : other_frame.c_str(), transform.child.c_str(), v[0], v[1],
+             v[2], v[3], v[4], v[5], v[6]);
 }
 
 std::string mjcf_camera(const data::NamedTransform& transform, const Lens& lens) {

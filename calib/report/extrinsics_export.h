@@ -15,8 +15,10 @@ using Lens = std::optional<data::CameraIntrinsics>;
 std::string ros_static_transform(const data::NamedTransform& transform, const Lens& lens = {});
 /// A fixed joint, roll, pitch and yaw about fixed x, y, z.
 std::string urdf_joint(const data::NamedTransform& transform, const Lens& lens = {});
-/// easy_handeye2's calibration file.
-std::string easy_handeye2(const data::NamedTransform& transform, Setup setup, const Lens& lens = {});
+/// easy_handeye2's calibration file. `other`: the frame of the robot that does not carry the camera; empty:
+/// base, or gripper.
+std::string easy_handeye2(const data::NamedTransform& transform, Setup setup, const Lens& lens = {},
+                          const std::string& other = "");
 /// A camera of MuJoCo's MJCF, which looks along -z with y up, in the body of the parent. Its lens has no
 /// distortion.
 std::string mjcf_camera(const data::NamedTransform& transform, const Lens& lens = {});

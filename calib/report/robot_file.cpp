@@ -2,7 +2,12 @@
 
 #include <tinyxml2.h>
 
+#include <algorithm>
+#include <array>
+#include <map>
 #include <sstream>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "data/files/error.h"
@@ -61,7 +66,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 
 std::string listed(const std::vector<std::string>& names) {
   constexpr std::size_t kMost = 12;
-  std::string text;
+  std::string text = names.empty() ? "none" : "";
   for (std::size_t k = 0; k < names.size() && k < kMost; ++k) text += (k > 0 ? ", " : "") + names[k];
   return names.size() > kMost ? text + ", ..." : text;
 }
@@ -74,6 +79,15 @@ std::string marked(const std::string& block, const std::string& camera, const st
   return text + "\n" + indent + last_mark(camera);
 }
 
+/// Throws where several elements of the kind have a name.
+void expect_one(const std::vector<std::string>& names, const std::string& path, const std::string& kind,
+                const std::string& name) {
+  const auto count = std::count(names.begin(), names.end(), name);
+  if (count > 1)
+    throw input_error(path, kind,
+                      "found \"" + name + "\" " + std::to_string(count) + " times, expected it once");
+}
+
 /// Throws where another element of the kind has the camera's name.
 void expect_free(const std::vector<std::string>& names, const std::string& path, const std::string& kind,
                  const std::string& camera) {
@@ -82,6 +96,21 @@ void expect_free(const std::vector<std::string>& names, const std::string& path,
         path, kind,
         "found \"" + camera +
             "\", which flash-calib did not write, expected none: give it another with --child-frame");
+}
+
+/// The same text with blanks in place of comments, of CDATA and of what stands between <? and ?>.
+std::string without_remarks(std::string text) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kKinds = {
+      {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}}};
+  for (std::size_t k = 0; k < text.size(); ++k)
+    for (const auto& [begin, end] : kKinds) {
+      if (text.compare(k, begin.size(), begin) != 0) continue;
+      const std::size_t last = text.find(end, k + begin.size());
+      const std::size_t after = last == std::string::npos ? text.size() : last + end.size();
+      std::fill(text.begin() + static_cast<std::ptrdiff_t>(k),
+                text.begin() + static_cast<std::ptrdiff_t>(after), ' ');
+    }
+  return text;
 }
 
 std::size_t end_of_tag(const std::string& text, std::size_t begin) {
@@ -98,20 +127,13 @@ std::size_t end_of_tag(const std::string& text, std::size_t begin) {
   return std::string::npos;
 }
 
-/// Behind the opening tag of the n-th element of a kind, in the order of the document, comments left out.
-/// npos: its tag closes itself, or there is none.
-std::size_t behind_tag(const std::string& text, const std::string& kind, std::size_t n) {
-  const std::string tag = "<" + kind;
-  for (std::size_t k = 0; k < text.size(); ++k) {
-    if (text.compare(k, 4, "<!--") == 0) {
-      const std::size_t end = text.find("-->", k);
-      if (end == std::string::npos) return end;
-      k = end + 2;
-      continue;
-    }
-    if (text.compare(k, tag.size(), tag) != 0) continue;
+/// Behind the opening tag of the n-th element of a kind, in the order of the document. npos: its tag closes
+/// itself, or there is none.
+std::size_t behind_tag(const std::string& document, const std::string& kind, std::size_t n) {
+  const std::string text = without_remarks(document), tag = "<" + kind;
+  for (std::size_t k = text.find(tag); k != std::string::npos; k = text.find(tag, k + 1)) {
     const char next = k + tag.size() < text.size() ? text[k + tag.size()] : '\0';
-    if (next != '>' && next != '/' && next != ' ' && next != '\t' && next != '\n' && next != '\r') continue;
+    if (std::string_view(">/ \t\n\r").find(next) == std::string_view::npos) continue;
     if (n-- > 0) continue;
     const std::size_t end = end_of_tag(text, k);
     return end == std::string::npos || text[end - 1] == '/' ? std::string::npos : end + 1;
@@ -119,22 +141,65 @@ std::size_t behind_tag(const std::string& text, const std::string& kind, std::si
   return std::string::npos;
 }
 
+/// The link that carries each link of a robot.
+std::map<std::string, std::string> parents_of(const tinyxml2::XMLElement& robot) {
+  std::map<std::string, std::string> parents;
+  for (const auto* joint = robot.FirstChildElement("joint"); joint;
+       joint = joint->NextSiblingElement("joint")) {
+    const auto* const parent = joint->FirstChildElement("parent");
+    const auto* const child = joint->FirstChildElement("child");
+    const char* const above = parent ? parent->Attribute("link") : nullptr;
+    const char* const below = child ? child->Attribute("link") : nullptr;
+    if (above && below) parents[below] = above;
+  }
+  return parents;
+}
+
+/// Throws where the camera would carry itself.
+void expect_tree(const tinyxml2::XMLElement& robot, const std::string& path,
+                 const data::NamedTransform& transform) {
+  const std::map<std::string, std::string> parents = parents_of(robot);
+  std::string link = transform.parent;
+  for (std::size_t k = 0; k <= parents.size(); ++k) {
+    if (link == transform.child)
+      throw input_error(
+          path, "link " + transform.parent,
+          "hangs on \"" + transform.child + "\", expected a link that the camera does not carry");
+    const auto above = parents.find(link);
+    if (above == parents.end()) return;
+    link = above->second;
+  }
+}
+
+/// Throws unless a name can stand in a comment of XML.
+void expect_name_in_comment(const std::string& name) {
+  if (name.find("--") != std::string::npos)
+    throw data::InputError("--child-frame: found \"" + name +
+                           "\", expected no two hyphens in a row, which XML forbids in comments");
+}
+
 }  // namespace
 
 std::string camera_in_urdf(const std::string& text, const std::string& path,
                            const data::NamedTransform& transform, const Lens& lens) {
+  expect_name_in_comment(transform.child);
   std::string robot = without_camera(text, path, transform.child);
   tinyxml2::XMLDocument document;
   parse(robot, path, "robot", document);
-  std::vector<std::string> links;
+  std::vector<std::string> links, joints;
   add_names(*document.RootElement(), "link", links);
-  const bool has_macros = robot.find("xacro:") != std::string::npos;
+  add_names(*document.RootElement(), "joint", joints);
+  const std::string visible = without_remarks(robot);
+  const bool has_macros = visible.find("<xacro:") != std::string::npos;
   if (!contains(links, transform.parent) && !has_macros)
     throw input_error(path, "link",
                       "found " + listed(links) + ", expected \"" + transform.parent +
                           "\", on which the camera is: name it as the robot does with --parent-frame");
+  expect_one(links, path, "link", transform.parent);
   expect_free(links, path, "link", transform.child);
-  const std::size_t end = robot.rfind("</robot>");
+  expect_free(joints, path, "joint", transform.parent + "_to_" + transform.child);
+  expect_tree(*document.RootElement(), path, transform);
+  const std::size_t end = visible.rfind("</robot");
   if (end == std::string::npos)
     throw data::InputError(path + ": found a robot without links, expected </robot> at its end");
   const std::string block = "<link name=\"" + transform.child + "\"/>\n" + urdf_joint(transform, lens);
@@ -144,6 +209,7 @@ std::string camera_in_urdf(const std::string& text, const std::string& path,
 
 std::string camera_in_mjcf(const std::string& text, const std::string& path,
                            const data::NamedTransform& transform, const Lens& lens) {
+  expect_name_in_comment(transform.child);
   std::string robot = without_camera(text, path, transform.child);
   tinyxml2::XMLDocument document;
   parse(robot, path, "mujoco", document);
@@ -160,6 +226,7 @@ std::string camera_in_mjcf(const std::string& text, const std::string& path,
         "found " + listed(bodies) + ", expected \"" + transform.parent +
             "\", on which the camera is: name it as the robot does with --parent-frame; world is the "
             "worldbody");
+  expect_one(bodies, path, "body", transform.parent);
   const std::size_t place = behind_tag(robot, of_world ? "worldbody" : "body", n);
   if (place == std::string::npos)
     throw input_error(path, of_world ? "worldbody" : "body " + transform.parent,

@@ -180,8 +180,8 @@ std::optional<Concluded> conclude_on_own_mesh(const Task& task, const Found& abo
   concluded.found.estimate.errors.insert(concluded.found.estimate.errors.end(), of_solution.begin(),
                                          of_solution.end());
   concluded.answer.warnings.emplace_back(
-      "the search's own mesh explains the recordings better than cells of no size: the answer is of that "
-      "mesh");
+      "the mesh that was simulated explains the recordings better than cells of no size: the answer is of "
+      "that mesh");
   return concluded;
 }
 

@@ -6,6 +6,7 @@
 #include "data/files/text.h"
 #include "sysid/emulate/parameter_grid.h"
 #include "sysid/infer/weight_scale.h"
+#include "sysid/report/searched_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -95,6 +96,8 @@ void check_agreement(const Summary& summary, const std::string& path) {
 void check_values(const Summary& summary, const std::string& path) {
   if (summary.agreement) check_agreement(summary, path);
   check_best(summary, path);
+  if (const auto scale = summary.settings.find("cell_scale"); scale != summary.settings.end())
+    cell_scale_of(scale->second, path);
   for (const auto& [name, value] : summary.best) check_value(path, "best.parameters", name, value);
   for (const auto& [name, fixed] : summary.fixed) check_value(path, "fixed", name, fixed.value);
   check_score(path, "best.score", summary.best_score);

@@ -135,11 +135,34 @@ def of_usd(calib, work, truth):
     yield UsdGeom.GetStageMetersPerUnit(stage) == 1 and UsdGeom.GetStageUpAxis(stage) == "Z", "usd: other units or axes"
 
 
+def odd_files(calib, work, truth):
+    """Links are followed, permissions stay, and what only looks like the end of a robot is none."""
+    target, link = work / "target.urdf", work / "link.urdf"
+    target.write_text(ROBOT + "<!-- was: <robot></robot> -->\n")
+    target.chmod(0o640)
+    link.symlink_to(target.name)
+    into = ("export", truth["file"], "--to", "urdf", "--into", link, "--parent-frame", "tool0", "--child-frame", "eye")
+    program.must(calib, *into)
+    yield link.is_symlink() and "flash-calib: eye" in target.read_text(), "urdf: a link was replaced"
+    yield target.stat().st_mode & 0o777 == 0o640, "urdf: other permissions"
+    yield xml.fromstring(target.read_text()).find("link[@name='eye']") is not None, "urdf: the camera is in a comment"
+    long = "a" * 300
+    program.must(calib, "export", truth["file"], "--to", "urdf", "-o", work / "long.urdf", "--parent-frame", long, "--child-frame", "b" * 300)
+    yield xml.fromstring((work / "long.urdf").read_text()).find("joint/parent").get("link") == long, "urdf: a long name is cut"
+    model = work / "cdata.xml"
+    model.write_text(MODEL.replace("<worldbody>", "<custom><![CDATA[ <body name='q'> ]]></custom><worldbody>"))
+    program.must(calib, "export", truth["file"], "--to", "mjcf", "--into", model, "--parent-frame", "tool0", "--child-frame", "eye")
+    carrier = next(body for body in xml.fromstring(model.read_text()).iter("body") if body.get("name") == "tool0")
+    yield carrier.find("camera") is not None, "mjcf: the camera is in another body"
+
+
 def refused(calib, work, truth):
     robot, model = work / "other.urdf", work / "other.xml"
     robot.write_text(ROBOT)
     model.write_text(MODEL)
     file = truth["file"]
+    twice = work / "twice.urdf"
+    twice.write_text(ROBOT.replace("</robot>", '<link name="tool0"/></robot>'))
     for words, expected in (
             (("--to", "urdf", "--into", robot), 'expected "' + truth["parent"] + '"'),
             (("--to", "urdf", "--into", robot, "--parent-frame", "tool0", "--child-frame", "base"), "flash-calib did not write"),
@@ -152,6 +175,9 @@ def refused(calib, work, truth):
             (("--to", "tf", "-o", file, "--force"), "extrinsics"),
             (("--to", "step", "-o", work / "a"), "--to"),
             (("--to", "tf", "-o", work / "a", "--child-frame", "a b"), "--child-frame"),
+            (("--to", "urdf", "--into", robot, "--parent-frame", "tool0", "--child-frame", "eye--1"), "two hyphens"),
+            (("--to", "urdf", "--into", twice, "--parent-frame", "tool0"), '"tool0" 2 times'),
+            (("--to", "urdf", "--into", "/dev/null", "--parent-frame", "tool0"), "/dev/null"),
             (("--to", "urdf", "--into", work / "none.urdf"), "none.urdf")):
         before = sorted(p.name for p in work.iterdir()), robot.read_text(), model.read_text(), pathlib.Path(file).read_text()
         done = program.call(calib, "export", file, *words)
@@ -175,7 +201,7 @@ def main():
         transform = answer["transform"]
         truth = {"file": file, "t": transform["translation"], "R": program.rotation_of(transform["rotation_xyzw"]), "lens": answer["lens"],
                  "parent": transform["parent"]}
-        results = [row for check in (of_urdf, of_mjcf, of_usd, refused) for row in check(options.calib, work, truth)]
+        results = [row for check in (of_urdf, of_mjcf, of_usd, odd_files, refused) for row in check(options.calib, work, truth)]
         for kind in ("tf", "easy_handeye2", "opencv"):
             done = program.must(options.calib, "export", file, "--to", kind, "-o", work / kind, "--json")
             results.append((json.loads(done.stdout)["file"] == str(work / kind) and (work / kind).exists(), f"{kind}: not written"))

@@ -37,8 +37,9 @@ Extrinsics beside_the_robot() {
 /// Six points about the table, seen by a camera at `camera` without an error.
 std::vector<TouchedPoint> touched(const Eigen::Isometry3d& camera) {
   std::vector<TouchedPoint> points;
-  for (const Eigen::Vector3d& place : {Eigen::Vector3d(0.4, 0, 0), Eigen::Vector3d(0.6, 0, 0.1), Eigen::Vector3d(0.5, 0.3, 0),
-                                       Eigen::Vector3d(0.7, 0.2, 0.2), Eigen::Vector3d(0.3, -0.1, 0.05), Eigen::Vector3d(0.5, 0.1, 0)})
+  for (const Eigen::Vector3d& place :
+       {Eigen::Vector3d(0.4, 0, 0), Eigen::Vector3d(0.6, 0, 0.1), Eigen::Vector3d(0.5, 0.3, 0),
+        Eigen::Vector3d(0.7, 0.2, 0.2), Eigen::Vector3d(0.3, -0.1, 0.05), Eigen::Vector3d(0.5, 0.1, 0)})
     points.push_back({place, *data::project(*beside_the_robot().lens, camera.inverse() * place)});
   return points;
 }

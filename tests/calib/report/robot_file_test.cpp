@@ -35,6 +35,18 @@ TEST(RobotFile, OfMjcfTheBodyOfTheNameTakesTheCamera) {
   EXPECT_EQ(camera_in_mjcf(once, "r.xml", transform), once);
 }
 
+// Two cameras that carry each other are no tree.
+TEST(RobotFile, ACameraDoesNotCarryItself) {
+  const std::string robot = "<robot><link name='tool0'/></robot>";
+  data::NamedTransform eye = transform, other = transform;
+  other.parent = "eye";
+  other.child = "other";
+  const std::string both = camera_in_urdf(camera_in_urdf(robot, "r.urdf", eye), "r.urdf", other);
+  eye.parent = "other";
+  EXPECT_NE(data::input_error_of([&] { camera_in_urdf(both, "r.urdf", eye); }).find("does not carry"),
+            std::string::npos);
+}
+
 TEST(RobotFile, WhatHoldsNoCameraIsRefused) {
   const auto urdf = [](const std::string& text) {
     return data::input_error_of([&] { camera_in_urdf(text, "r.urdf", transform); });
