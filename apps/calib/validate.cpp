@@ -192,6 +192,13 @@ bool is_calibration(const std::string& path) {
          schema->get<std::string>().starts_with("flash-extrinsics/");
 }
 
+/// What is written is neither the calibration nor what it is held against.
+void expect_own_file(const ValidateOptions& options, const char* name, const std::string& other) {
+  if (options.out.empty()) return;
+  expect_own_files({(fs::path(options.out) / name).string()}, {options.extrinsics, other});
+  expect_folder_apart(options.out, {options.extrinsics, other});
+}
+
 /// Whether the camera of a second calibration stands where that of the first does.
 int run_placement(const ValidateOptions& options) {
   const calib::Extrinsics first = calib::load_extrinsics(options.extrinsics, options.despite_doubts),
@@ -224,6 +231,7 @@ int run_touched(const ValidateOptions& options) {
     throw data::InputError("--touched: found " + options.dataset.path +
                            " beside it, expected one of the two");
   if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
+  expect_own_file(options, kTouched, options.touched);
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::TouchCheck found = calib::check_touched(
@@ -271,6 +279,7 @@ int run_validate(const CLI::App& verb, ValidateOptions options) {
         "dataset, --touched: found neither, expected a recording, or points that were touched");
   if (is_calibration(options.dataset.path)) {
     if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
+    expect_own_file(options, kPlacement, options.dataset.path);
     return run_placement(options);
   }
   std::string own;

@@ -178,14 +178,21 @@ void expect_name_in_comment(const std::string& name) {
                            "\", expected no two hyphens in a row, which XML forbids in comments");
 }
 
+/// The text without what an earlier call added, which is parsed into the document.
+std::string parsed_without_camera(const std::string& text, const std::string& path, const std::string& root,
+                                  const std::string& camera, tinyxml2::XMLDocument& document) {
+  expect_name_in_comment(camera);
+  std::string robot = without_camera(text, path, camera);
+  parse(robot, path, root, document);
+  return robot;
+}
+
 }  // namespace
 
 std::string camera_in_urdf(const std::string& text, const std::string& path,
                            const data::NamedTransform& transform, const Lens& lens) {
-  expect_name_in_comment(transform.child);
-  std::string robot = without_camera(text, path, transform.child);
   tinyxml2::XMLDocument document;
-  parse(robot, path, "robot", document);
+  std::string robot = parsed_without_camera(text, path, "robot", transform.child, document);
   std::vector<std::string> links, joints;
   add_names(*document.RootElement(), "link", links);
   add_names(*document.RootElement(), "joint", joints);
@@ -209,10 +216,8 @@ std::string camera_in_urdf(const std::string& text, const std::string& path,
 
 std::string camera_in_mjcf(const std::string& text, const std::string& path,
                            const data::NamedTransform& transform, const Lens& lens) {
-  expect_name_in_comment(transform.child);
-  std::string robot = without_camera(text, path, transform.child);
   tinyxml2::XMLDocument document;
-  parse(robot, path, "mujoco", document);
+  std::string robot = parsed_without_camera(text, path, "mujoco", transform.child, document);
   std::vector<std::string> bodies, cameras;
   add_names(*document.RootElement(), "body", bodies);
   add_names(*document.RootElement(), "camera", cameras);

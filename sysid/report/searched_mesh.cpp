@@ -43,7 +43,10 @@ std::vector<std::string> meshes_of(const Summary& summary, const std::string& pa
 }  // namespace
 
 std::string named_mesh(const Replay& replay) {
-  const std::string& mesh = replay.settings.mesh.empty() ? replay.object_mesh : replay.settings.mesh;
+  return named_mesh(replay.settings.mesh.empty() ? replay.object_mesh : replay.settings.mesh);
+}
+
+std::string named_mesh(const std::string& mesh) {
   return data::is_made_on_the_spot(mesh) ? mesh : std::filesystem::absolute(mesh).lexically_normal().string();
 }
 

@@ -14,7 +14,10 @@ struct SearchedMesh {
   double cell_scale = 1;  ///< as in ReplaySettings
 };
 
-/// The specification of the mesh of a replay before its cells are scaled, or its file, by its absolute path.
+/// A specification as it is; a file by its absolute path.
+std::string named_mesh(const std::string& mesh);
+
+/// That of a replay before its cells are scaled.
 std::string named_mesh(const Replay& replay);
 
 /// What `settings` of a summary or an asset say of the scale; 1 where they do not. `source`: names the file.

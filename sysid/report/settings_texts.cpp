@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "data/files/text.h"
-#include "data/mesh/procedural_mesh.h"
 #include "sysid/replay/recorded_grasp.h"
 #include "sysid/replay/replay_mesh.h"
+#include "sysid/report/searched_mesh.h"
 
 namespace flash::sysid {
 namespace {
@@ -58,11 +57,6 @@ std::string grasp_shapes(const std::vector<Replay>& replays) {
   return shapes;
 }
 
-/// A mesh, of which a file is named by its absolute path.
-std::string wherever(const std::string& mesh) {
-  return data::is_made_on_the_spot(mesh) ? mesh : std::filesystem::absolute(mesh).lexically_normal().string();
-}
-
 bool describes_recording(const std::string& name) {
   const Parameter* const found = find_parameter(name);
   return found != nullptr && !found->material;
@@ -90,11 +84,11 @@ std::map<std::string, std::string> settings_texts(const std::vector<Replay>& rep
   std::map<std::string, std::string> texts;
   const double scale = replay.settings.cell_scale;
   if (scale < 1) texts["cell_scale"] = data::format_number(scale);
-  texts["mesh"] = wherever(replay.recording.mesh_spec) +
+  texts["mesh"] = named_mesh(replay.recording.mesh_spec) +
                   (scale < 1 && !takes_any_cell(replay.recording) ? ", its cells halved (" : " (") +
                   data::format_count(static_cast<std::size_t>(replay.sheet().rest.vertices.rows())) +
                   " vertices)";
-  texts["object_mesh"] = wherever(replay.object_mesh);
+  texts["object_mesh"] = named_mesh(replay.object_mesh);
   if (const auto& solid = settings.base.solid) {
     texts["element_type"] = "TETRAHEDRON";
     texts["element_order"] = replay.settings.element_order == data::ElementOrder::quadratic ? "2" : "1";
