@@ -9,7 +9,6 @@
 #include "apps/calib/verbs.h"
 #include "apps/command_line/command_line.h"
 #include "apps/command_line/doubts_option.h"
-#include "apps/command_line/option_checks.h"
 #include "apps/command_line/result_files.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/cloud_check.h"
@@ -373,10 +372,10 @@ void add_validate_verb(CLI::App& app, Action& action) {
           "base [m] and its pixel in a picture of the camera")
       ->type_name("FILE");
   verb->add_option("--touch-sd", options->touch.touch_sd, "How well the tip's place is known, an axis [m]")
-      ->check(positive_number())
+      ->check(CLI::Range(1e-6, 1.0))
       ->capture_default_str();
   verb->add_option("--pixel-sd", options->touch.pixel_sd, "How well its pixel is known, an axis [px]")
-      ->check(positive_number())
+      ->check(CLI::Range(1e-2, 100.0))
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");
   add_calib_common_options(*verb, options->common);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/check/chance.h"
 #include "data/files/error.h"
 
 namespace flash::calib {
@@ -24,26 +25,20 @@ Placement placement(const Extrinsics& first, const Extrinsics& second, const std
     throw data::InputError(second_name + ": found no covariance, nor in " + first_name +
                            ", expected how well each of them is known");
   result.chi_square = result.apart.dot(both.solve(result.apart));
-  const double half = 0.5 * result.chi_square;
-  result.chance = std::exp(-half) * (1 + half + 0.5 * half * half);  // chi-square's, six degrees of freedom
+  result.chance = chance_beyond(result.chi_square, 6);
   constexpr double kMoved = 0.01;
   result.moved = result.chance < kMoved;
   return result;
 }
 
 std::string describe(const Placement& placement) {
-  char chance[40];
-  if (placement.chance < 1e-6)
-    std::snprintf(chance, sizeof chance, "less than 0.0001 %%");
-  else
-    std::snprintf(chance, sizeof chance, "%.3g %%", 100 * placement.chance);
   char text[240];
   std::snprintf(
       text, sizeof text,
       "%s: the two put the camera %.2f mm and %.3f deg apart; one that stands still would be put farther "
       "apart with a chance of %s",
       placement.moved ? "moved" : "same", 1e3 * placement.apart.head<3>().norm(),
-      placement.apart.tail<3>().norm() * 180 / M_PI, chance);
+      placement.apart.tail<3>().norm() * 180 / M_PI, chance_text(placement.chance).c_str());
   return text;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/check/chance.h"
 #include "calib/geometry/pose.h"
 #include "data/camera/camera.h"
 #include "data/files/atomic_file.h"
@@ -26,13 +27,6 @@ Rows23 pixel_by_place(const data::CameraIntrinsics& lens, const Eigen::Vector3d&
     rows.col(axis) = (*data::project(lens, place + d) - *data::project(lens, place - d)) / (2 * step);
   }
   return rows;
-}
-
-/// That of chi square with an even number of degrees of freedom beyond x (Abramowitz and Stegun 26.4.5).
-double chance_beyond(double x, int degrees_of_freedom) {
-  double term = std::exp(-0.5 * x), sum = term;
-  for (int k = 1; k < degrees_of_freedom / 2; ++k) sum += term *= 0.5 * x / k;
-  return std::min(sum, 1.0);
 }
 
 }  // namespace
@@ -68,9 +62,13 @@ std::vector<TouchedPoint> load_touched_points(const std::string& path) {
 TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<TouchedPoint>& points,
                          const TouchSettings& settings, const std::string& path) {
   if (extrinsics.setup != Setup::eye_to_hand)
-    throw data::InputError(path + ": the camera is on the gripper, expected one beside the robot");
+    throw data::InputError("--extrinsics: found a camera on the gripper, expected one beside the robot");
   if (!extrinsics.lens)
-    throw data::InputError(path + ": the calibration is of pairs of poses, expected one with a lens");
+    throw data::InputError("--extrinsics: found a calibration of pairs of poses, expected one with a lens");
+  constexpr std::size_t kMost = 1000;  // whose covariance is a dense matrix
+  if (points.size() > kMost)
+    throw data::InputError(path + ": found " + data::format_count(points.size()) +
+                           " points, expected at most " + data::format_count(kMost));
   const data::CameraIntrinsics& lens = *extrinsics.lens;
   const Eigen::Isometry3d camera_from_base = extrinsics.transform.T.inverse();
   const auto count = static_cast<Eigen::Index>(points.size());
@@ -82,14 +80,21 @@ TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<Touched
   for (Eigen::Index i = 0; i < count; ++i) {
     const TouchedPoint& point = points[static_cast<std::size_t>(i)];
     const Eigen::Vector3d place = camera_from_base * point.place;
-    const std::optional<Eigen::Vector2d> pixel = data::project(lens, place);
-    if (!pixel)
+    constexpr double kNearest = 0.01;  // before the camera [m]
+    if (!(place.z() > kNearest))
       throw data::input_error(path, "point " + std::to_string(i + 1),
-                              "lies behind the camera: are the places in metres, in the base?");
+                              "lies behind the camera or in it: are the places in metres, in the base?");
+    const auto inside = [](double value, int size) { return value >= -0.5 && value <= size - 0.5; };
+    if (!inside(point.pixel.x(), lens.width) || !inside(point.pixel.y(), lens.height))
+      throw data::input_error(path, "point " + std::to_string(i + 1),
+                              "found pixel " + data::format_short(point.pixel.x()) + ", " +
+                                  data::format_short(point.pixel.y()) + ", expected one of the picture, " +
+                                  std::to_string(lens.width) + " x " + std::to_string(lens.height));
+    const Eigen::Vector2d pixel = data::project(lens, place).value();
     const Rows23 by_place = pixel_by_place(lens, place);
     Eigen::Matrix<double, 3, 6> moves;  // of the place in the camera, by the camera's right perturbation
     moves << -Eigen::Matrix3d::Identity(), skew(place);
-    errors.segment<2>(2 * i) = point.pixel - *pixel;
+    errors.segment<2>(2 * i) = point.pixel - pixel;
     by_pose.middleRows<2>(2 * i) = by_place * moves;
     by_shift.middleRows<2>(2 * i) = -by_place * camera_from_base.linear();
     noise.block<2, 2>(2 * i, 2 * i) =
@@ -130,10 +135,10 @@ std::string describe(const TouchCheck& check) {
   std::snprintf(
       text, sizeof text,
       "the touched points are missed by %.2f mm across the line of sight (%.2f px) where about %.2f mm are "
-      "expected; a right calibration would miss them by more with a chance of %.3g %%; they fit best with "
+      "expected; a right calibration would miss them by more with a chance of %s; they fit best with "
       "the "
       "camera moved by (%.1f, %.1f, %.1f) +- (%.1f, %.1f, %.1f) mm",
-      1e3 * check.rms_across, check.rms_px, 1e3 * check.expected_across, 100 * check.chance,
+      1e3 * check.rms_across, check.rms_px, 1e3 * check.expected_across, chance_text(check.chance).c_str(),
       1e3 * check.shift.x(), 1e3 * check.shift.y(), 1e3 * check.shift.z(), 1e3 * check.shift_sd.x(),
       1e3 * check.shift_sd.y(), 1e3 * check.shift_sd.z());
   return text;

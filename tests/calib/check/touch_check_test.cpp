@@ -111,6 +111,10 @@ TEST(TouchCheck, WhatItCannotJudgeIsRefused) {
   other = beside_the_robot();
   other.setup = Mount::eye_in_hand;
   EXPECT_NE(error(other, points).find("beside the robot"), std::string::npos);
+  EXPECT_NE(error(beside_the_robot(), {{{0.5, 0.1, 0}, {1e300, 2}}}).find("of the picture, 1280 x 720"),
+            std::string::npos);
+  EXPECT_NE(error(beside_the_robot(), std::vector<TouchedPoint>(1001, points[0])).find("at most 1,000"),
+            std::string::npos);
   EXPECT_NE(error(beside_the_robot(), {{{400, 0, 1500}, {1, 2}}}).find("in metres"), std::string::npos);
 }
 
