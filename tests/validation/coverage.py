@@ -360,12 +360,23 @@ def read_rows(paths):
     return twins, bounds
 
 
+def read_of(answer):
+    """What the tables read of an answer; numbers to six digits."""
+    def rounded(numbers):
+        return None if numbers is None else [float(f"{number:.6g}") for number in numbers]
+
+    parameters = {name: {"identifiable": finding["identifiable"], "interval95": rounded(finding["interval95"])}
+                  for name, finding in answer["parameters"].items()}
+    return answer | {"parameters": parameters, "noise": float(f"{answer['noise']:.4g}"), "seconds": round(answer["seconds"])}
+
+
 def write_rows(out, twins, bounds):
-    """coverage.json, for read_rows."""
-    rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
+    """coverage.json, for read_rows: a line a twin."""
+    rows = [read_of(twin) | {"recording": pathlib.Path(twin["recording"]).name, "also": {way: read_of(a) for way, a in twin.get("also", {}).items()},
+                             "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
             for twin in sorted(twins, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]
     part = out / "coverage.json.tmp"
-    part.write_text(json.dumps(rows, indent=1))
+    part.write_text("[" + ",\n ".join(json.dumps(row) for row in rows) + "]\n")
     part.replace(out / "coverage.json")
     return rows
 
