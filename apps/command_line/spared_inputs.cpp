@@ -34,6 +34,7 @@ struct CommandLine {
   std::vector<std::string> outputs, inputs;
   std::string out;  ///< the output that may be a folder
   bool resumes = false;
+  bool is_shared = false;  ///< by several programs, each of which holds a part of it
   bool writes_asset = false, writes_recording = false;
 };
 
@@ -46,6 +47,7 @@ void collect(const CLI::App& app, CommandLine& line) {
     const std::string name = option->get_name();
     if (option->count() == 0 || kKept.contains(name) || takes_words(*option)) continue;
     if (name == "--resume") line.resumes = true;
+    if (name == "--shard") line.is_shared = true;
     if (name == "--out") line.out = option->results().front();
     for (const std::string& value : option->results()) {
       if (kOutputs.contains(name))
@@ -96,7 +98,7 @@ void expect_spared_inputs(const CLI::App& app) {
   std::erase_if(line.outputs, [](const std::string& path) { return !is_file(whole_path(path)); });
   if (line.outputs.empty() && !is_folder(whole_path(line.out)))
     return;  // nothing is there to be written over
-  if (is_folder(whole_path(line.out))) {
+  if (is_folder(whole_path(line.out)) && !line.is_shared) {
     data::expect_not_held(line.out);
     if (const std::string search = search_of(whole_path(line.out)); !search.empty())
       data::expect_not_held(search);

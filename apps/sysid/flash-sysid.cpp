@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   flash::add_grid_verb(app, action);
   flash::add_replay_verb(app, action);
   flash::add_fit_verb(app, action);
+  flash::add_merge_verb(app, action);
   flash::add_predict_verb(app, action);
   flash::add_compare_verb(app, action);
   flash::add_plan_verb(app, action);

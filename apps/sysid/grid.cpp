@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include "apps/command_line/option_checks.h"
 #include "apps/sysid/options.h"
 #include "apps/sysid/search.h"
+#include "apps/sysid/shard_option.h"
 #include "apps/sysid/verbs.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
@@ -37,6 +39,7 @@ struct GridOptions {
   std::string posterior;  ///< empty: by the number of parameters
   bool resume = false;
   std::string rollouts;
+  ShardOptions shard;
   std::vector<std::string> map;
   std::string out;
 };
@@ -77,6 +80,9 @@ void check_options(const GridOptions& options) {
   if (options.resume && options.common.force)
     throw data::InputError(
         "--resume: found --force beside it, which removes the results, expected one of the two");
+  if (!options.shard.shard.empty() && options.common.force)
+    throw data::InputError(
+        "--shard: found --force beside it, which removes what others wrote; expected --resume");
   for (const std::string& name : options.map)
     if (std::none_of(options.axes.begin(), options.axes.end(),
                      [&](const auto& axis) { return axis.first == name; }))
@@ -114,8 +120,13 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   stop_on_signals();
   if (options.max_hours > 0) stop_after(options.max_hours);
   check_options(options);
+  sysid::Shard shard = shard_of(options.shard);
+  shard.told = [said = std::make_shared<std::atomic<bool>>()](const std::string& what) {
+    if (!said->exchange(true)) warn(what);
+  };
+  const std::string folder = folder_of_shard(options.out, shard);
   const auto begin = std::chrono::steady_clock::now();
-  const std::string grid_file = (fs::path(options.out) / "grid.json").string();
+  const std::string grid_file = (fs::path(folder) / "grid.json").string();
   const bool goes_on = options.resume && fs::exists(grid_file);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   if (goes_on) order_as(sysid::load_grid_file(grid_file).recordings, recordings);
@@ -129,9 +140,10 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   std::vector<sysid::Replay> replays = make_replays(recordings, simulated, options.common);
 
   std::vector<std::string> notices;
-  const sysid::GridSettings settings = grid_settings(
+  sysid::GridSettings settings = grid_settings(
       options, material_base(asset, replays.front().sheet(), notices, axes_of(parse_holds(options.holds))),
       threads);
+  settings.shard = shard;
   if (simulated.self_contact) sysid::on_half_the_cell(replays);  // refused before anything is simulated
   std::vector<sysid::ReplayCandidate> candidates;
   for (const std::vector<double>& values : sysid::cartesian_product(settings.axes))
@@ -147,12 +159,12 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   end_after_signal();
   sysid::Fingerprint print = sysid::fingerprint(replays, settings);
   if (!options.posterior.empty()) print["posterior (--posterior)"] = options.posterior;
-  sysid::ResultsStore store(options.out, settings.axes, names_of(recordings), print,
+  sysid::ResultsStore store(folder, settings.axes, names_of(recordings), print,
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace
-                                                   : sysid::Existing::refuse);
-  if (options.resume && !goes_on)
-    say(options.common, options.out + ": holds no search yet, --resume begins one");
+                                                   : sysid::Existing::refuse,
+                            shard.count > 1 ? sysid::Writers::several : sysid::Writers::one);
+  if (options.resume && !goes_on) say(options.common, folder + ": holds no search yet, --resume begins one");
   for (const std::string& notice : notices) say(options.common, notice);
   tell_known_before(options.common, replays, settings,
                     options.no_solver_check ? sysid::Coming::search : sysid::Coming::answer);
@@ -202,6 +214,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
                    "Folder that keeps the motions, for several searches; without it, motions/ of the run");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   add_max_hours_option(*verb, options->max_hours);
+  add_shard_options(*verb, options->shard);
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);
   add_device_option(*verb, options->common);

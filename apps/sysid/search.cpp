@@ -155,7 +155,7 @@ std::vector<sysid::NextExperiment> next_experiments(const Search& search, const 
   settings.at = answer.values;
   settings.known = {sysid::covariance_of_draws(settings.grid.axes, answer.samples),
                     sysid::expected_misfit(answer.misfits), sysid::mean_duration(search.replays)};
-  const sysid::MotionStore store(search.settings.rollouts);
+  const sysid::MotionStore store(search.settings.rollouts, search.settings.shard);
   const auto spreads = [&](const std::vector<double>& of) {
     std::map<std::string, double> named;
     std::size_t k = 0;
@@ -171,6 +171,10 @@ std::vector<sysid::NextExperiment> next_experiments(const Search& search, const 
   return ranked;
 }
 
+std::string share_text(const sysid::Shard& shard) {
+  return "share " + std::to_string(shard.index + 1) + " of " + std::to_string(shard.count);
+}
+
 // Judges what was found and writes the answer.
 int conclude(Search& search, const sysid::ResultsStore& store, const sysid::TimeLeft& time,
              const CommonOptions& options) {
@@ -183,8 +187,13 @@ int conclude(Search& search, const sysid::ResultsStore& store, const sysid::Time
         results, search.replays, search.settings, search.asked,
         [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
   }();
+  std::vector<sysid::NextExperiment> experiments = next_experiments(search, answer, options);
+  if (const sysid::Shard& shard = search.settings.shard; shard.index > 0) {
+    say(options, share_text(shard) + " is done; the first writes the answer, " + search.out);
+    return exit_done;
+  }
   sysid::Summary summary = sysid::summarize(results, answer, search.replays, search.settings, search.asked);
-  summary.next_experiments = next_experiments(search, answer, options);
+  summary.next_experiments = std::move(experiments);
   summary.asset = fs::absolute(search.asset.source).lexically_normal().string();
   summary.device = search.replays.front().settings.device == sim::Device::cuda ? "cuda" : "cpu";
   summary.wall_seconds =
@@ -268,6 +277,10 @@ int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& 
     return conclude(search, store, time, options);
   } catch (const data::Stopped&) {
     return kept();
+  } catch (const sysid::OthersMissing& others) {
+    say(options, share_text(search.settings.shard) + " is done, and " + others.what() +
+                     "; flash-sysid merge brings shares together, --resume goes on");
+    return exit_done;
   } catch (const sim::DeviceError& error) {
     return kept(std::string(error.what()) + "; ");
   }

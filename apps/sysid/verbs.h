@@ -13,6 +13,7 @@ using Action = std::function<int()>;
 /// Each adds one verb to `flash-sysid`; parsing it sets `action`.
 void add_grid_verb(CLI::App& app, Action& action);
 void add_replay_verb(CLI::App& app, Action& action);
+void add_merge_verb(CLI::App& app, Action& action);
 void add_fit_verb(CLI::App& app, Action& action);
 void add_plan_verb(CLI::App& app, Action& action);
 void add_predict_verb(CLI::App& app, Action& action);

@@ -105,11 +105,15 @@ void write_together(const std::vector<FileText>& files) {
   for (TemporaryFile& file : temporary) file.take_place();
 }
 
-void remove_leftovers(const std::string& folder) {
+void remove_leftovers(const std::string& folder, const std::set<std::string>& spared) {
   std::vector<std::filesystem::path> left;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-    if (is_temporary(entry.path()) && std::filesystem::is_regular_file(entry.symlink_status()))
-      left.push_back(entry.path());
+  using Iterator = std::filesystem::recursive_directory_iterator;
+  for (Iterator entry(folder); entry != Iterator(); ++entry) {
+    if (entry.depth() == 0 && spared.contains(entry->path().filename().string()))
+      entry.disable_recursion_pending();
+    if (is_temporary(entry->path()) && std::filesystem::is_regular_file(entry->symlink_status()))
+      left.push_back(entry->path());
+  }
   for (const std::filesystem::path& path : left) std::filesystem::remove(path);
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +23,9 @@ struct FileText {
 /// Several files likewise, those without a path left out: none of them where the disk does not hold all.
 void write_together(const std::vector<FileText>& files);
 
-/// Removes from `folder` the temporary files of writers that were killed. Only while nobody writes there.
-void remove_leftovers(const std::string& folder);
+/// Removes from `folder` the temporary files of writers that were killed. Only while nobody writes there, but
+/// to the folders in it that are `spared`, by their names.
+void remove_leftovers(const std::string& folder, const std::set<std::string>& spared = {});
 
 /// Where others may write to `folder` too, and it may hold other things: removes those temporary files of
 /// files with this extension, as ".rollout", that nothing was written to for a day. No writer takes as long.

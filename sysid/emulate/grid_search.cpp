@@ -155,6 +155,29 @@ void score_candidates(const std::vector<Replay>& replays, const ScoreSettings& s
   }
 }
 
+/// Simulates this shard's motions of all candidates, and waits for those of the others.
+void share_out(const std::vector<Replay>& replays, const std::vector<ReplayCandidate>& candidates,
+               const MotionStore& kept, const std::function<void(const Progress&)>& progress) {
+  std::vector<WantedMotion> wanted;
+  for (const ReplayCandidate& candidate : candidates)
+    for (const Replay& replay : replays) wanted.push_back({&replay, candidate});
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point begin = Clock::now();
+  std::mutex mutex;
+  Progress state;
+  state.total = static_cast<int>(candidates.size());
+  state.best_score = std::numeric_limits<double>::infinity();
+  std::size_t motions = 0;
+  kept.prepare(wanted, [&] {
+    const std::scoped_lock lock(mutex);
+    state.done = static_cast<int>(++motions / replays.size());
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    state.candidates_per_second = state.done / std::max(seconds, 1e-9);
+    state.seconds_left = (state.total - state.done) / std::max(state.candidates_per_second, 1e-9);
+    if (progress && state.done > 0) progress(state);
+  });
+}
+
 }  // namespace
 
 bool grid_search(const std::vector<Replay>& replays, const GridSettings& settings, ResultsStore& store,
@@ -173,11 +196,21 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
     replay.settings.envs = settings.envs;
     if (stop != nullptr) replay.settings.solver.stop = stop;
   }
-  const std::optional<MotionStore> kept =
-      settings.rollouts.empty() ? std::nullopt : std::optional<MotionStore>(settings.rollouts);
+  std::optional<MotionStore> kept;
+  if (!settings.rollouts.empty()) kept.emplace(settings.rollouts, settings.shard);
   std::vector<CloudSearches> searches;
   for (const Replay& replay : batched)
     searches.push_back(device_searches(replay, settings.score.registration.points_per_keyframe));
+  if (kept && settings.shard.count > 1) {
+    std::vector<ReplayCandidate> candidates;
+    for (const std::vector<double>& values : grid)
+      candidates.push_back(make_candidate(settings.base, axes, values));
+    try {
+      share_out(batched, candidates, *kept, progress);
+    } catch (const data::Stopped&) {
+      return false;
+    }
+  }
   Results results(store, static_cast<int>(grid.size()), progress);
   const auto at_once = static_cast<std::size_t>(std::max(1, settings.envs));
   for (std::size_t first = 0; first < wanted.size(); first += at_once) {

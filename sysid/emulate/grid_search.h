@@ -9,6 +9,7 @@
 #include "sysid/emulate/results_store.h"
 #include "sysid/observe/registration.h"
 #include "sysid/replay/replay.h"
+#include "sysid/replay/shard.h"
 
 namespace flash::sysid {
 
@@ -31,6 +32,7 @@ struct GridSettings {
   int envs = 64;  ///< candidates in a batch, at most
   int threads = 1;
   std::string rollouts;  ///< folder that keeps the motions (MotionStore); empty: none are kept
+  Shard shard = {};      ///< of the motions; the others are of programs that share `rollouts`
 };
 
 /// A value that was measured becomes a constant, another an axis of one value.
@@ -62,6 +64,7 @@ std::vector<Registration> registrations_of(const std::vector<Replay>& replays,
 /// not depend on threads; an end at any moment loses at most `envs` of them. `progress` is called after each
 /// candidate, one thread at a time; `stop`, once set, ends the search after the steps in work, and the
 /// candidates in work are left out, as after a sim::DeviceError, which names its. True when all is there.
+/// Of several shards each first simulates its own motions of all candidates. Throws OthersMissing.
 bool grid_search(const std::vector<Replay>& replays, const GridSettings& settings, ResultsStore& store,
                  const std::function<void(const Progress&)>& progress = {},
                  const std::atomic<bool>* stop = nullptr);

@@ -117,7 +117,7 @@ std::string listed(const std::vector<std::string>& names) {
 
 ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
                            const std::vector<std::string>& recordings, const Fingerprint& fingerprint,
-                           Existing existing)
+                           Existing existing, Writers writers)
     : folder_(folder) {
   const bool holds_search = fs::exists(path_of(folder, "grid.json"));
   if (!holds_search && existing != Existing::replace) check_holds_nothing(folder, axes);
@@ -128,7 +128,8 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
   try {
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
       throw data::InputError(folder + ": another run is writing to it; wait for it, or name another folder");
-    data::remove_leftovers(folder);
+    data::remove_leftovers(folder, writers == Writers::several ? std::set<std::string>{"motions", "shards"}
+                                                               : std::set<std::string>());
     if (existing == Existing::replace) remove_results(folder);
     if (!fs::exists(path_of(folder, "grid.json")))
       begin(axes, recordings, fingerprint);

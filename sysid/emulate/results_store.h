@@ -14,6 +14,9 @@ enum class Existing {
   replace  ///< they are removed, with summary, report and best motions
 };
 
+/// Of what lies in folders of the folder: of several, none removes what another may be writing.
+enum class Writers { one, several };
+
 /// A folder of results that only ever grows: results.csv (one line a candidate; with several recordings its
 /// offsets are those of the first), registrations.csv (one line a candidate and recording) and keyframes.csv
 /// (one line a candidate, recording and keyframe). grid.json holds axes, recordings and the fingerprint of
@@ -31,7 +34,8 @@ class ResultsStore {
   /// and, unless they are to be replaced, where it holds results without grid.json. Throws std::system_error
   /// where no file can be made in it.
   ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
-               const std::vector<std::string>& recordings, const Fingerprint& fingerprint, Existing existing);
+               const std::vector<std::string>& recordings, const Fingerprint& fingerprint, Existing existing,
+               Writers writers = Writers::one);
   ~ResultsStore();
   ResultsStore(const ResultsStore&) = delete;
   ResultsStore& operator=(const ResultsStore&) = delete;

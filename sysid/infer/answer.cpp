@@ -317,7 +317,7 @@ AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
 std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
                                const std::vector<double>& start, const Extent& around,
                                const AnswerSettings& settings, const TellWork& told) {
-  const MotionStore store(grid.rollouts);
+  const MotionStore store(grid.rollouts, grid.shard);
   const std::vector<Replay> finer = finer_replays(replays, settings);
   const Task task{replays, finer, grid, grid.axes, settings, store, told};
   Extent extent = around;
@@ -355,7 +355,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.horizons.resize(replays.size());
   answer.best = best_of(results);
   if (answer.best < 0) return answer;
-  const MotionStore store(grid.rollouts);
+  const MotionStore store(grid.rollouts, grid.shard);
   std::vector<double> best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   if (settings.horizon) {
     keep_predictable(best, grid, store, results, replays, answer, told);

@@ -1,12 +1,15 @@
 #include "sysid/replay/motion_store.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string_view>
+#include <thread>
 #include <type_traits>
 #include <utility>
 
@@ -28,7 +31,8 @@ namespace {
 
 constexpr std::string_view kMagic = "flash-rollout/4\n";
 constexpr const char* kExtension = ".rollout";
-constexpr std::size_t kDigest = 64;  // hexadecimal digits of a SHA-256
+constexpr std::size_t kDigest = 64;                           // hexadecimal digits of a SHA-256
+constexpr std::size_t kHeader = kMagic.size() + 2 * kDigest;  // the key, and the sum of what follows
 
 /// Numbers as the bytes they are.
 class Bytes {
@@ -164,7 +168,7 @@ std::string key_of(const Replay& replay, const ReplayCandidate& candidate, const
 void save(const ReplayResult& result, const std::vector<int>& kept, const std::string& key,
           const std::string& path) {
   // A motion is megabytes: they are written once, behind room for their sum.
-  const std::size_t sum_at = kMagic.size() + kDigest, header = sum_at + kDigest;
+  const std::size_t sum_at = kMagic.size() + kDigest;
   std::size_t numbers = 3 * result.motion.forces.size() + 16;
   for (const int step : kept)
     numbers += static_cast<std::size_t>(result.motion.positions[static_cast<std::size_t>(step)].size()) + 2;
@@ -179,21 +183,25 @@ void save(const ReplayResult& result, const std::vector<int>& kept, const std::s
   for (Eigen::Index i = 0; i < forces.rows(); ++i)
     forces.row(i) = result.motion.forces[static_cast<std::size_t>(i)].transpose();
   bytes.add_matrix(forces);
-  bytes.overwrite(sum_at, data::sha256(std::string_view(bytes.text()).substr(header)));
+  bytes.overwrite(sum_at, data::sha256(std::string_view(bytes.text()).substr(kHeader)));
   data::write_atomically(path, bytes.text(), data::Sync::later);
 }
+
+bool is_whole(std::string_view text) {
+  return text.starts_with(kMagic) && text.size() >= kHeader &&
+         data::sha256(text.substr(kHeader)) == text.substr(kMagic.size() + kDigest, kDigest);
+}
+
+std::string_view key_in(std::string_view text) { return text.substr(kMagic.size(), kDigest); }
 
 /// Empty where the file is not as it was written, as a power cut may leave it: then it is simulated again.
 std::optional<ReplayResult> load(const Replay& replay, const std::vector<int>& kept, const std::string& key,
                                  const std::string& path) {
   const std::string text = data::read_file(path);
   const std::string_view whole = text;
-  const std::size_t header = kMagic.size() + 2 * kDigest;
-  if (!whole.starts_with(kMagic) || whole.size() < header ||
-      data::sha256(whole.substr(header)) != whole.substr(kMagic.size() + kDigest, kDigest))
-    return std::nullopt;
-  BytesReader bytes(whole.substr(header), path);
-  if (whole.substr(kMagic.size(), kDigest) != key) bytes.fail("key", "that of another motion", key);
+  if (!is_whole(whole)) return std::nullopt;
+  BytesReader bytes(whole.substr(kHeader), path);
+  if (key_in(whole) != key) bytes.fail("key", "that of another motion", key);
   ReplayResult result;
   for (double* value : {&result.motion.start, &result.motion.step, &result.residual_max,
                         &result.penetration_max, &result.unconverged_share})
@@ -217,7 +225,7 @@ std::string motion_key(const Replay& replay, const ReplayCandidate& candidate) {
   return key_of(replay, candidate, scored_steps(replay));
 }
 
-MotionStore::MotionStore(const std::string& folder) : folder_(folder) {
+MotionStore::MotionStore(const std::string& folder, Shard shard) : folder_(folder), shard_(std::move(shard)) {
   std::filesystem::create_directories(folder);
   data::remove_old_leftovers(folder, kExtension);
 }
@@ -226,14 +234,26 @@ std::string MotionStore::path_of(const std::string& key) const {
   return (std::filesystem::path(folder_) / (key + kExtension)).string();
 }
 
+bool MotionStore::has(const std::string& key) const { return std::filesystem::exists(path_of(key)); }
+
 void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
                       const std::function<void(std::size_t, ReplayResult)>& finished) const {
+  if (shard_.count > 1) {
+    std::vector<WantedMotion> wanted;
+    for (const ReplayCandidate& candidate : candidates) wanted.push_back({&replay, candidate});
+    prepare(wanted);
+  }
+  read_or_simulate(replay, candidates, finished);
+}
+
+void MotionStore::read_or_simulate(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
+                                   const std::function<void(std::size_t, ReplayResult)>& finished) const {
   const std::vector<int> kept = scored_steps(replay);
   std::vector<std::string> wanted(candidates.size());
   data::for_each_in_parallel(candidates.size(), replay.settings.threads, [&](std::size_t i) {
     std::string key = key_of(replay, candidates[i], kept);
     std::optional<ReplayResult> found;
-    if (std::filesystem::exists(path_of(key))) found = load(replay, kept, key, path_of(key));
+    if (has(key)) found = load(replay, kept, key, path_of(key));
     if (found)
       finished(i, std::move(*found));
     else
@@ -264,13 +284,40 @@ ReplayResult MotionStore::run(const Replay& replay, const ReplayCandidate& candi
   return only;
 }
 
-void MotionStore::prepare(const std::vector<WantedMotion>& wanted) const {
-  std::map<const Replay*, std::vector<ReplayCandidate>> batches;
-  for (const WantedMotion& motion : wanted) {
-    const Replay& replay = *motion.replay;
-    const std::string key = motion_key(replay, motion.candidate);
-    if (!std::filesystem::exists(path_of(key))) batches[motion.replay].push_back(motion.candidate);
+void MotionStore::prepare(const std::vector<WantedMotion>& wanted,
+                          const std::function<void()>& simulated) const {
+  std::vector<std::string> keys;
+  for (const WantedMotion& motion : wanted) keys.push_back(motion_key(*motion.replay, motion.candidate));
+  std::vector<WantedMotion> own;
+  std::vector<std::pair<std::string, WantedMotion>> of_others;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (has(keys[i])) continue;
+    if (owner_of(i, keys.front(), shard_.count) == shard_.index)
+      own.push_back(wanted[i]);
+    else
+      of_others.emplace_back(keys[i], wanted[i]);
   }
+  simulate(own, simulated);
+  if (!of_others.empty()) wait_for(std::move(of_others));
+}
+
+int MotionStore::take_from(const std::string& folder) const {
+  int taken = 0;
+  for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string key = entry.path().stem().string();
+    if (entry.path().extension() != kExtension || has(key)) continue;
+    const std::string text = data::read_file(entry.path().string());
+    if (!is_whole(text) || key_in(text) != key) continue;
+    data::write_atomically(path_of(key), text, data::Sync::later);
+    ++taken;
+  }
+  return taken;
+}
+
+void MotionStore::simulate(const std::vector<WantedMotion>& wanted,
+                           const std::function<void()>& simulated) const {
+  std::map<const Replay*, std::vector<ReplayCandidate>> batches;
+  for (const WantedMotion& motion : wanted) batches[motion.replay].push_back(motion.candidate);
   if (batches.empty()) return;
   std::vector<std::pair<const Replay*, std::vector<ReplayCandidate>>> all(batches.begin(), batches.end());
   const auto work = [](const auto& batch) {
@@ -281,8 +328,38 @@ void MotionStore::prepare(const std::vector<WantedMotion>& wanted) const {
   // The longest first, or all wait for it.
   std::sort(all.begin(), all.end(), [&](const auto& a, const auto& b) { return work(a) > work(b); });
   data::for_each_in_parallel(all.size(), all.front().first->settings.threads, [&](std::size_t k) {
-    run(*all[k].first, all[k].second, [](std::size_t, const ReplayResult&) {});
+    read_or_simulate(*all[k].first, all[k].second, [&](std::size_t, const ReplayResult&) {
+      if (simulated) simulated();
+    });
   });
+}
+
+void MotionStore::wait_for(std::vector<std::pair<std::string, WantedMotion>> missing) const {
+  using Clock = std::chrono::steady_clock;
+  const std::atomic<bool>* stop = missing.front().second.replay->settings.solver.stop;
+  auto last = Clock::now();
+  bool is_told = false;
+  while (true) {
+    // A client of a network disk looks for new files where a folder is opened anew.
+    const std::filesystem::directory_iterator opened(folder_);
+    if (std::erase_if(missing, [&](const auto& motion) { return has(motion.first); }) > 0)
+      last = Clock::now();
+    if (missing.empty()) return;
+    if (!shard_.waits) throw OthersMissing(missing.size());
+    if (stop != nullptr && *stop) throw data::Stopped();
+    if (std::chrono::duration<double>(Clock::now() - last).count() < shard_.patience) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      continue;
+    }
+    if (shard_.told && !std::exchange(is_told, true))
+      shard_.told(std::to_string(missing.size()) +
+                  " motions of other shares did not come: they are simulated here");
+    // Those who wait begin at unlike ones.
+    const auto taken = missing.begin() +
+                       static_cast<std::ptrdiff_t>(static_cast<std::size_t>(shard_.index) % missing.size());
+    simulate({taken->second}, {});
+    missing.erase(taken);
+  }
 }
 
 }  // namespace flash::sysid

@@ -1,7 +1,11 @@
 #pragma once
+#include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "sysid/replay/replay.h"
+#include "sysid/replay/shard.h"
 
 namespace flash::sysid {
 
@@ -25,7 +29,7 @@ class MotionStore {
  public:
   /// Creates the folder; removes what programs that were killed a day ago or earlier left in it. Throws
   /// std::runtime_error where it cannot.
-  explicit MotionStore(const std::string& folder);
+  explicit MotionStore(const std::string& folder, Shard shard = {});
 
   /// The candidates' motions at the scored steps, from the folder where they are there, else simulated and
   /// kept. `finished` as in sysid::run. Throws data::InputError naming a file that is whole and
@@ -37,13 +41,24 @@ class MotionStore {
   ReplayResult run(const Replay& replay, const ReplayCandidate& candidate) const;
 
   /// Simulates what the folder lacks of motions that are asked for next: those of a replay as a batch, and
-  /// replays side by side.
-  void prepare(const std::vector<WantedMotion>& wanted) const;
+  /// replays side by side. Of several shards each takes its own, tells of each (`simulated`, by any thread),
+  /// and waits for the others; those that do not come in time it simulates, too. Throws OthersMissing where
+  /// it is not to wait, data::Stopped where the solver is to stop.
+  void prepare(const std::vector<WantedMotion>& wanted, const std::function<void()>& simulated = {}) const;
+
+  /// Copies the whole motions of another folder that this one lacks. Returns how many.
+  int take_from(const std::string& folder) const;
 
  private:
   std::string path_of(const std::string& key) const;
+  bool has(const std::string& key) const;
+  void read_or_simulate(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
+                        const std::function<void(std::size_t, ReplayResult)>& finished) const;
+  void simulate(const std::vector<WantedMotion>& wanted, const std::function<void()>& simulated) const;
+  void wait_for(std::vector<std::pair<std::string, WantedMotion>> missing) const;
 
   std::string folder_;
+  Shard shard_;
 };
 
 }  // namespace flash::sysid

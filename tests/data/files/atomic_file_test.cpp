@@ -71,6 +71,18 @@ TEST(RemoveLeftovers, TakesTemporaryFilesOfAnyFolderBelowAndNothingElse) {
   EXPECT_TRUE(std::filesystem::exists(folder / "link.1-2.tmp"));
 }
 
+TEST(RemoveLeftovers, SparesFoldersThatOthersWriteTo) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "own/motions");
+  std::filesystem::create_directories(folder / "motions");
+  for (const char* name : {"a.csv.12-3.tmp", "motions/b.12-3.tmp", "own/motions/c.12-3.tmp"})
+    folder.write(name, "");
+  remove_leftovers(folder / ".", {"motions"});
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.csv.12-3.tmp"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "motions/b.12-3.tmp"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "own/motions/c.12-3.tmp"));
+}
+
 TEST(RemoveOldLeftovers, TakesTemporaryFilesOfADayAgoAndNothingElse) {
   namespace fs = std::filesystem;
   const TemporaryFolder folder;

@@ -2,10 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "data/files/atomic_file.h"
+#include "data/files/error.h"
 #include "data/files/sha256.h"
 #include "data/mesh/procedural_mesh.h"
 #include "sysid/capture/render_depth.h"
@@ -175,6 +181,81 @@ TEST(MotionStore, AFileThatIsNotAsItWasWrittenIsSimulatedAgainAndAnotherIsNamed)
   candidate.material.friction = towel().friction;
   EXPECT_EQ(message_of(other).find("key: "), 0u);
   EXPECT_EQ(message_of(whole), "");
+}
+
+/// Six of the towel, each with another friction.
+std::vector<WantedMotion> six(const Replay& replay) {
+  std::vector<WantedMotion> wanted;
+  for (int i = 0; i < 6; ++i) {
+    ReplayCandidate candidate{towel(), {}};
+    candidate.material.friction += 0.02 * i;
+    wanted.push_back({&replay, candidate});
+  }
+  return wanted;
+}
+
+TEST(MotionStore, SharesSimulateTheirOwnAndReadTheOthers) {
+  const data::TemporaryFolder folder;
+  const Replay replay = recorded(folder, "corner_lift", 1);
+  const std::vector<WantedMotion> wanted = six(replay);
+  std::array<std::atomic<int>, 2> simulated{};
+  std::array<std::vector<double>, 2> ends;
+  std::vector<std::thread> programs;
+  for (int k = 0; k < 2; ++k)
+    programs.emplace_back([&, k] {
+      const MotionStore store(folder / "rollouts", {.index = k, .count = 2});
+      store.prepare(wanted, [&, k] { ++simulated[static_cast<std::size_t>(k)]; });
+      for (const WantedMotion& motion : wanted)
+        ends[static_cast<std::size_t>(k)].push_back(
+            store.run(replay, motion.candidate).motion.positions.back().sum());
+    });
+  for (std::thread& program : programs) program.join();
+  EXPECT_EQ(simulated[0], 3);
+  EXPECT_EQ(simulated[1], 3);
+  EXPECT_EQ(ends[0], ends[1]);
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    EXPECT_EQ(ends[0][i], run(replay, {wanted[i].candidate}).front().motion.positions.back().sum());
+}
+
+TEST(MotionStore, AShareThatDoesNotComeIsSimulatedHere) {
+  const data::TemporaryFolder folder;
+  const Replay replay = recorded(folder, "corner_lift", 1);
+  std::vector<std::string> told;
+  const MotionStore store(folder / "rollouts",
+                          {.index = 2, .count = 3, .patience = 0, .told = [&](const std::string& what) {
+                             told.push_back(what);
+                           }});
+  store.prepare(six(replay));
+  EXPECT_EQ(files_in(folder / "rollouts"), 6);
+  EXPECT_EQ(told,
+            std::vector<std::string>{"4 motions of other shares did not come: they are simulated here"});
+}
+
+TEST(MotionStore, WithoutWaitingTheOwnShareIsKeptAndTheOthersAreMissing) {
+  const data::TemporaryFolder folder;
+  const Replay replay = recorded(folder, "corner_lift", 1);
+  for (int k = 0; k < 3; ++k) {
+    const MotionStore store(folder / "share" + std::to_string(k), {.index = k, .count = 3, .waits = false});
+    EXPECT_THROW(store.prepare(six(replay)), OthersMissing);
+    EXPECT_EQ(files_in(folder / "share" + std::to_string(k)), 2);
+  }
+  data::write_atomically((std::filesystem::directory_iterator(folder / "share2")->path()).string(), "torn");
+  const MotionStore store(folder / "all", {.waits = false});
+  EXPECT_EQ(store.take_from(folder / "share0"), 2);
+  EXPECT_EQ(store.take_from(folder / "share1"), 2);
+  EXPECT_EQ(store.take_from(folder / "share1"), 0);
+  EXPECT_EQ(store.take_from(folder / "share2"), 1);
+}
+
+TEST(MotionStore, WhoWaitsForOthersStopsWhenAsked) {
+  const data::TemporaryFolder folder;
+  Replay replay = recorded(folder, "corner_lift", 1);
+  std::atomic<bool> stop = false;
+  replay.settings.solver.stop = &stop;
+  const MotionStore store(folder / "rollouts", {.index = 0, .count = 2});
+  int simulated = 0;
+  EXPECT_THROW(store.prepare(six(replay), [&] { stop = ++simulated == 3; }), data::Stopped);
+  EXPECT_EQ(files_in(folder / "rollouts"), 3);
 }
 
 TEST(Sensitivity, ExplainsTheMotionOfAnotherParameterByThatParameter) {

@@ -1,0 +1,103 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "apps/command_line/command_line.h"
+#include "apps/sysid/options.h"
+#include "apps/sysid/verbs.h"
+#include "data/files/error.h"
+#include "data/files/json_reader.h"
+#include "data/files/text.h"
+#include "sysid/emulate/fingerprint.h"
+#include "sysid/emulate/grid_file.h"
+#include "sysid/replay/motion_store.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MergeOptions {
+  CommonOptions common;
+  std::vector<std::string> runs;
+  std::string out;
+};
+
+/// The grid.json of a search and of shares that were not the first.
+std::vector<std::string> grid_files(const std::string& run) {
+  std::vector<std::string> files;
+  const auto take = [&](const fs::path& folder) {
+    if (fs::exists(folder / "grid.json")) files.push_back((folder / "grid.json").string());
+  };
+  take(run);
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(run) / "shards", none))
+    take(entry.path());
+  return files;
+}
+
+/// That all are of one search: else nobody would ask for the motions of some.
+void expect_one_search(const std::vector<std::string>& runs, const std::string& out) {
+  std::optional<std::pair<std::string, sysid::GridFile>> first;
+  std::vector<std::string> files;
+  for (const std::string& run : runs) {
+    const std::vector<std::string> of_run = grid_files(run);
+    if (of_run.empty() || !fs::is_directory(fs::path(run) / "motions"))
+      throw data::InputError(run + ": found no search with motions, expected a folder that flash-sysid grid --shard wrote");
+    files.insert(files.end(), of_run.begin(), of_run.end());
+  }
+  for (const std::string& file : grid_files(out)) files.push_back(file);
+  for (const std::string& file : files) {
+    sysid::GridFile grid = sysid::load_grid_file(file);
+    if (!first) {
+      first.emplace(file, std::move(grid));
+      continue;
+    }
+    const std::string changed = grid.fingerprint && first->second.fingerprint
+                                    ? sysid::difference(*first->second.fingerprint, *grid.fingerprint)
+                                    : "another version of the program";
+    if (!changed.empty())
+      throw data::InputError(file + ": this is not the search of " + first->first + ": " + changed);
+  }
+}
+
+int run_merge(const MergeOptions& options) {
+  expect_one_search(options.runs, options.out);
+  const std::string folder = (fs::path(options.out) / "motions").string();
+  const sysid::MotionStore store(folder);
+  int taken = 0;
+  for (const std::string& run : options.runs) {
+    const std::string from = (fs::path(run) / "motions").string();
+    if (fs::equivalent(from, folder)) continue;
+    end_after_signal();
+    const int of_run = store.take_from(from);
+    say(options.common, run + ": " + std::to_string(of_run) + " motions");
+    taken += of_run;
+  }
+  if (options.common.json)
+    std::cout << data::format_json(nlohmann::ordered_json{
+        {"schema", "flash-sysid-merge/1"}, {"motions", folder}, {"taken", taken}});
+  else
+    std::printf("%s\n", folder.c_str());
+  return exit_done;
+}
+
+}  // namespace
+
+void add_merge_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<MergeOptions>();
+  CLI::App* verb = app.add_subcommand("merge", "Bring the motions of shares of one search together");
+  verb->add_option("run", options->runs, "Folders that grid --shard I/N --own-share wrote")->required();
+  verb->add_option("-o,--out", options->out, "Folder of the search, for grid --resume")->required();
+  add_common_options(*verb, options->common);
+  verb->footer(
+      "Example:\n"
+      "  flash-sysid merge run_1 run_2 run_3 -o run\n"
+      "  flash-sysid grid lift_a --asset towel.json --bending 1e-6:1e-3:8:log --resume -o run");
+  verb->callback([options, &action] { action = [options] { return run_merge(*options); }; });
+}
+
+}  // namespace flash
