@@ -7,13 +7,14 @@
 #include <cmath>
 
 #include "calib/solve/linearization.h"
+#include "calib/uncertainty/pose_error_modes.h"
 #include "calib/uncertainty/pose_information.h"
 #include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {
 
-constexpr int kOwn = 6, kModes = 5;
+constexpr int kOwn = PoseModes::kOwn, kModes = PoseModes::kSmooth;
 constexpr double kReaches[] = {0.5, 1, 2, 4, 8};  // of the rms distance between two poses
 // Turns [rad], a factor of two apart: 0.006 to 0.4 deg.
 constexpr double kSizes[] = {1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3};
@@ -23,79 +24,7 @@ constexpr double kOdds = 1;  // of errors that are smooth against errors that ar
 constexpr double kOnceInTwenty = data::chi_square_95_of_3;
 constexpr std::size_t kEnough = 30;  // poses from which sizes are estimated
 
-using Columns = Eigen::Matrix<double, kOwn, 3>;
-
-/// The ways in which an error moves the gripper, as columns of (dt, dtheta) in base axes.
-struct PoseModes {
-  Eigen::Vector3d place;
-  Eigen::Matrix3d attitude;
-  Columns translation, rotation;  ///< of independent errors, about the arm's pivot
-  std::array<Columns, kModes>
-      smooth;  ///< of a turn by one radian, and of lengths that are wrong in proportion
-};
-
-/// Where the arm stands is not asked: poses may be in the frame of a table. It is taken to be kReach away, in
-/// any direction from the middle of the places. What a turn about it does there is a shift of two axes in
-/// three. Lengths are wrong by as much as a turn makes them over half of the reach: in base axes, at the
-/// wrist, and of a stretch along the arm, one axis in three.
-constexpr double kReach = 0.6;  // [m]
-
-PoseModes modes_of(const Bundle& bundle, std::size_t i, const Eigen::Vector3d& middle) {
-  const RobotPose& pose = bundle.poses[i];
-  PoseModes modes;
-  modes.place = pose.T_base_gripper.translation();
-  modes.attitude = pose.T_base_gripper.linear();
-  const Eigen::Vector3d pivot = modes.attitude * bundle.pivots[static_cast<std::size_t>(pose.arm)];
-  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), O = Eigen::Matrix3d::Zero();
-  modes.translation << I, O;
-  modes.rotation << skew(pivot) * modes.attitude, modes.attitude;
-  auto& [wrist, base, shift, shift_of_wrist, stretch] = modes.smooth;
-  wrist = modes.rotation;
-  const Eigen::Vector3d place = modes.place - middle;
-  const double shifted = kReach * std::sqrt(2.0 / 3 + 0.25 + 0.25 / 3);
-  base << -skew(place), I;
-  shift << shifted * I, O;
-  shift_of_wrist << 0.5 * kReach * modes.attitude, O;
-  stretch.setZero();
-  stretch.col(0).head<3>() = 0.5 * place;
-  return modes;
-}
-
-std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::size_t>& poses) {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const std::size_t i : poses)
-    middle += bundle.poses[i].T_base_gripper.translation() / static_cast<double>(poses.size());
-  std::vector<PoseModes> modes;
-  for (const std::size_t i : poses) modes.push_back(modes_of(bundle, i, middle));
-  return modes;
-}
-
-/// Squared distances of places and of attitudes (chordal, so that a kernel of both is positive), each over
-/// its mean. The places are those reported, errors and all: spreads of less than ten times the noise
-/// (variances an axis) tell nothing of where the robot was, as those of a head that only turns.
-Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes, double place_noise,
-                                  double attitude_noise) {
-  constexpr double kLeast = 100 * 6;  // of the variance; two places differ by six of them
-  const auto count = static_cast<Eigen::Index>(modes.size());
-  Eigen::MatrixXd place = Eigen::MatrixXd::Zero(count, count), attitude = place;
-  for (Eigen::Index i = 0; i < count; ++i)
-    for (Eigen::Index j = 0; j < count; ++j) {
-      const PoseModes &a = modes[static_cast<std::size_t>(i)], &b = modes[static_cast<std::size_t>(j)];
-      place(i, j) = (a.place - b.place).squaredNorm();
-      attitude(i, j) = 0.5 * (a.attitude - b.attitude).squaredNorm();
-    }
-  const double pairs = static_cast<double>(count) * static_cast<double>(count - 1);
-  return place / std::max({place.sum() / pairs, kLeast * place_noise, 1e-12}) +
-         attitude / std::max({attitude.sum() / pairs, kLeast * attitude_noise, 1e-12});
-}
-
-/// Matern 5/2.
-Eigen::MatrixXd kernel(const Eigen::MatrixXd& squared, double reach) {
-  return squared.unaryExpr([reach](double d2) {
-    const double x = std::sqrt(5 * d2) / reach;
-    return (1 + x + x * x / 3) * std::exp(-x);
-  });
-}
+using Columns = PoseModes::Columns;
 
 /// Adds Y (k x I_3) Y^T to `sum` for Y = rows * columns, three columns a pose.
 void add_spread(const Eigen::MatrixXd& rows, const std::vector<Columns>& columns, const Eigen::MatrixXd* k,
@@ -271,7 +200,7 @@ std::vector<Candidate> candidates(const std::vector<PoseModes>& modes, const See
   const Eigen::MatrixXd squared = squared_distances(modes, noise.translation2, noise.rotation2);
   std::vector<Candidate> list;
   for (const double reach : kReaches) {
-    const Eigen::MatrixXd k = kernel(squared, reach);
+    const Eigen::MatrixXd k = matern(squared, reach);
     Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(n, n);
     for (std::size_t mode = 0; mode < kModes; ++mode)
       add_spread(seen.G_transposed, columns_of(modes, [mode](const PoseModes& m) { return m.smooth[mode]; }),
@@ -316,7 +245,7 @@ Eigen::MatrixXd field_covariance(const std::vector<PoseModes>& modes, const std:
                              (1 + (0.5 * candidate.fit.relative_variance.array()).min(0.5));
     }
     squares += size2;
-    k += size2 * kernel(squared, reach);
+    k += size2 * matern(squared, reach);
   }
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(kOwn * n, kOwn * n);
   for (Eigen::Index i = 0; i < n; ++i) {

@@ -1,0 +1,33 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "calib/solve/bundle.h"
+
+namespace flash::calib {
+
+/// The ways in which an error moves the gripper, as columns of (dt, dtheta) in base axes.
+struct PoseModes {
+  static constexpr int kOwn = 6, kSmooth = 5;
+  using Columns = Eigen::Matrix<double, kOwn, 3>;
+  Eigen::Vector3d place;
+  Eigen::Matrix3d attitude;
+  Columns translation, rotation;  ///< of independent errors, about the arm's pivot
+  std::array<Columns, kSmooth>
+      smooth;  ///< of a turn by one radian, and of lengths that are wrong in proportion
+};
+
+/// Of some poses of a bundle.
+std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::size_t>& poses);
+
+/// Squared distances of places and of attitudes (chordal, so that a kernel of both is positive), each over
+/// its mean. The places are those reported, errors and all: spreads of less than ten times the noise
+/// (variances an axis) tell nothing of where the robot was, as those of a head that only turns.
+Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes, double place_noise,
+                                  double attitude_noise);
+
+/// Matern 5/2 of poses at those distances (Rasmussen and Williams 2006).
+Eigen::MatrixXd matern(const Eigen::MatrixXd& squared, double reach);
+
+}  // namespace flash::calib
