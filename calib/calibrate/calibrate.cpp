@@ -427,9 +427,10 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
                       const CalibrateSettings& settings) {
-  return calibrate_moving(all, points, [&](const std::vector<Observation>& views) {
+  const StillSolver solver = [&](const std::vector<Observation>& views) {
     return solve(setup, camera, points, symmetries, views, settings);
-  });
+  };
+  return settings.motions ? calibrate_moving(all, points, solver) : solver(all);
 }
 
 }  // namespace flash::calib

@@ -36,7 +36,8 @@ struct CalibrateSettings {
   bool size_as_stated = false;  ///< it is not solved for, and what it may be off counts in the covariance
   LensKnowledge lens = LensKnowledge::near;
   LensCovariance lens_covariance = LensCovariance::Zero();  ///< as it was stated; zero: nothing was
-  int threads = 1;  ///< of held-out residuals and splits; 0: one a processor
+  bool motions = true;  ///< of camera and target are looked for; else both are taken to have stood still
+  int threads = 1;      ///< of held-out residuals and splits; 0: one a processor
 };
 
 struct ViewResult {

@@ -66,8 +66,7 @@ MotionTerms MotionEvidence::at(const ArmErrorLevel& level) const {
         level.rotation * level.rotation * rotation_.middleRows<kOwn>(kOwn * i) +
         level.translation * level.translation * translation_.middleRows<kOwn>(kOwn * i);
   for (Eigen::Index i = 0; i < n; ++i)
-    KL.middleCols<kOwn>(kOwn * i).noalias() =
-        K.middleCols<kOwn>(kOwn * i) * root_.middleRows<kOwn>(kOwn * i);
+    KL.middleCols<kOwn>(kOwn * i).noalias() = K.middleCols<kOwn>(kOwn * i) * root_.middleRows<kOwn>(kOwn * i);
   for (Eigen::Index i = 0; i < n; ++i)
     M.middleRows<kOwn>(kOwn * i).noalias() =
         root_.middleRows<kOwn>(kOwn * i).transpose() * KL.middleRows<kOwn>(kOwn * i);
@@ -98,8 +97,8 @@ MotionTerms MotionEvidence::at(const ArmErrorLevel& level) const {
   const Eigen::VectorXd y_s = shared.matrixL().solve(unit.cwiseProduct(g_s));
 
   MotionTerms terms;
-  terms.deviance = log_determinant(llt) - g.dot(Wg) + log_determinant(shared) -
-                   2 * unit.array().log().sum() - y_s.squaredNorm();
+  terms.deviance = log_determinant(llt) - g.dot(Wg) + log_determinant(shared) - 2 * unit.array().log().sum() -
+                   y_s.squaredNorm();
   for (int mover = 0; mover < 2; ++mover) {
     const int column = columns_[mover];
     Eigen::MatrixXd& J = terms.information[mover];

@@ -8,8 +8,8 @@
 // A motion is put into the poses that the robot reports: a camera that moved by m, right of X, and one of the
 // robot are the same: G X m = (G X m X^-1) X.
 #include <algorithm>
-#include <cstdio>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
@@ -27,6 +27,7 @@
 #include "data/files/error.h"
 #include "data/machine/parallel.h"
 #include "tests/calib/arm_scene.h"
+#include "tests/validation/motion_hypotheses.h"
 
 namespace flash::calib {
 namespace {
@@ -54,7 +55,8 @@ struct PutIn {
 struct Outcome {
   bool lost = false, claimed = false;
   std::string sentence;
-  std::optional<Calibration> answer;
+  std::optional<Calibration> still;  ///< the solution with all taken to have stood still
+  std::optional<WeighedMotions> weighed;
 };
 
 /// A motion of 3 mm or 0.4 deg in a random direction, of camera or target, as a step or all the time.
@@ -84,7 +86,8 @@ void put_in(Recording& recording, const PutIn& put) {
   const bool of_gripper = put.camera == (recording.setup == Setup::eye_in_hand);
   for (std::size_t i = 0; i < recording.views.size(); ++i) {
     const double share = share_of(put, i, recording.views.size());
-    const Eigen::Isometry3d motion = T * moved(Eigen::Isometry3d::Identity(), share * put.motion) * T.inverse();
+    const Eigen::Isometry3d motion =
+        T * moved(Eigen::Isometry3d::Identity(), share * put.motion) * T.inverse();
     Eigen::Isometry3d& G = recording.views[i].T_base_gripper;
     G = of_gripper ? G * motion.inverse() : motion * G;
   }
@@ -110,7 +113,10 @@ Outcome outcome_of(const Recording& recording) {
       for (const char* word : {"moved by", "moved all the time", "moved slowly", "views do not close"})
         if (outcome.sentence.empty() && warning.find(word) != std::string::npos) outcome.sentence = warning;
     outcome.claimed = !outcome.sentence.empty();
-    outcome.answer = result;
+    settings.motions = false;
+    outcome.still = calibrate(recording.setup, recording.camera, recording.points, recording.symmetries,
+                              recording.views, settings);
+    outcome.weighed = weigh_motions(outcome.still->refined, {.unknowns = outcome.still->unknowns});
   } catch (const data::InputError& error) {
     outcome.lost = true;
     outcome.sentence = error.what();
@@ -141,8 +147,9 @@ struct Ceiling {
   double motion_known = 0, time_known = 0;
 };
 
-/// Chances that a test at 1 % tells a motion whose squared length in its own standard deviations is `squared`:
-/// along it, and of any with six degrees of freedom (noncentral chi-square as a sum over Poisson's numbers).
+/// Chances that a test at 1 % tells a motion whose squared length in its own standard deviations is
+/// `squared`: along it, and of any with six degrees of freedom (noncentral chi-square as a sum over Poisson's
+/// numbers).
 Ceiling ceiling_of(double squared) {
   squared = std::clamp(squared, 1e-9, 1e3);
   constexpr double kNormal99 = 2.326, kChiSquare99 = 16.812;
@@ -151,17 +158,18 @@ Ceiling ceiling_of(double squared) {
   double outside = 0, term = std::exp(-x);  // of chi-square with 6 + 2 j degrees of freedom
   for (int i = 1; i <= 3; term *= x / i, ++i) outside += term;
   for (int j = 0; j < 2000; ++j) {
-    ceiling.time_known += outside * std::exp(j * std::log(0.5 * squared) - 0.5 * squared - std::lgamma(j + 1.0));
+    ceiling.time_known +=
+        outside * std::exp(j * std::log(0.5 * squared) - 0.5 * squared - std::lgamma(j + 1.0));
     outside += term;
     term *= x / (4 + j);
   }
   return ceiling;
 }
 
-/// Of a motion put into a recording that was answered without one.
+/// Of a motion put into a recording.
 std::optional<Ceiling> ceiling_of(const Outcome& still, const PutIn& put, std::size_t views) {
-  if (!still.answer || still.claimed) return std::nullopt;
-  const Calibration& answer = *still.answer;
+  if (!still.still) return std::nullopt;
+  const Calibration& answer = *still.still;
   const BundleSettings settings{.unknowns = answer.unknowns};
   const MotionEvidence evidence(answer.refined, settings);
   const MotionTerms terms = evidence.at(likeliest_level(evidence));
@@ -220,8 +228,13 @@ Recording drawn(const Errors& errors, Setup setup, std::size_t views, unsigned s
   const double reach = setup == Setup::eye_in_hand ? 0.4 : 0.6;
   HandEyeScene scene = errors.model.zero_deg > 0 ? make_arm_scene(settings, errors.model, reach, points, seed)
                                                  : make_scene(settings, points, seed);
-  return {errors.name,  setup, scene.camera, scene.points, grid_symmetries(scene.points),
-          scene.truth, std::move(scene.observations)};
+  return {errors.name,
+          setup,
+          scene.camera,
+          scene.points,
+          grid_symmetries(scene.points),
+          scene.truth,
+          std::move(scene.observations)};
 }
 
 struct Case {
@@ -245,7 +258,9 @@ void run(std::vector<Case>& cases) {
     one.outcome = outcome_of(one.recording);
     std::printf("%-32s %2zu views, %-30s view %2zu: %s %s\n", one.recording.name.c_str(),
                 one.recording.views.size(), kind(one).c_str(), one.put.first,
-                one.outcome.claimed ? "CLAIMED" : one.outcome.lost ? "LOST" : "-",
+                one.outcome.claimed ? "CLAIMED"
+                : one.outcome.lost  ? "LOST"
+                                    : "-",
                 one.outcome.sentence.substr(0, 160).c_str());
     std::fflush(stdout);
   });
@@ -276,6 +291,25 @@ void tally(const char* title, const std::vector<Case>& cases, const Key& key) {
     if (row.judged > 0)
       std::printf("; could be, motion known %5.1f %%, kind and time known %5.1f %%",
                   100 * row.ceiling.motion_known / row.judged, 100 * row.ceiling.time_known / row.judged);
+    std::printf("\n");
+  }
+}
+
+/// What weighed hypotheses claim and find beyond certain odds and sizes.
+void tally_weighed(const char* title, const std::vector<Case>& cases,
+                   const std::function<bool(const Case&)>& counts) {
+  std::printf("\nweighed hypotheses, %s: claimed of nothing put in, found of what was [%%]\n", title);
+  for (const double degrees : {0.0, 0.05, 0.1, 0.2, 0.3}) {
+    std::printf("  beyond %.2f deg at log odds", degrees);
+    for (const double least : {0.0, 3.0, 6.0, 9.0, 12.0}) {
+      double all[2] = {0, 0}, told[2] = {0, 0};
+      for (const Case& one : cases) {
+        if (!one.outcome.weighed || !counts(one)) continue;
+        ++all[one.put.any];
+        told[one.put.any] += log_odds(*one.outcome.weighed, degrees * kDegree) > least;
+      }
+      std::printf("  %2.0f: %5.1f %5.1f", least, 100 * told[0] / all[0], 100 * told[1] / all[1]);
+    }
     std::printf("\n");
   }
 }
@@ -314,6 +348,18 @@ void study(int cases_a_row, unsigned first_seed, const std::string& data, const 
     return std::to_string(one.recording.views.size()) + (one.put.any ? ", put in" : ", none");
   });
   tally("by motion", cases, kind);
+  const auto is_drawn = [](const Case& one) {
+    return std::any_of(std::begin(kErrors), std::end(kErrors),
+                       [&](const Errors& errors) { return one.recording.name == errors.name; });
+  };
+  // Both replay one list of taught poses, and differ from each other by the same from view to view.
+  const auto replayed = [](const Case& one) {
+    return one.recording.name == "eih_ur_chessboard_2" || one.recording.name == "eih_ur_chessboard_3";
+  };
+  tally_weighed("real", cases, [&](const Case& one) { return !is_drawn(one); });
+  tally_weighed("real, without UR 2 and 3", cases,
+                [&](const Case& one) { return !is_drawn(one) && !replayed(one); });
+  tally_weighed("drawn", cases, is_drawn);
 }
 
 }  // namespace

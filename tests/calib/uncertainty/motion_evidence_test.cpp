@@ -22,7 +22,8 @@ Refinement refined_scene(Setup setup, const BundleSettings& settings) {
 }
 
 /// -2 log likelihood, up to a constant, of errors of poses with a prior of covariance K, free shared unknowns
-/// and a known motion of the camera: the quadratic form over (errors, shared) at its least, and its determinant.
+/// and a known motion of the camera: the quadratic form over (errors, shared) at its least, and its
+/// determinant.
 double brute_deviance(const Refinement& refined, const BundleSettings& settings, const ArmErrorLevel& level,
                       const Eigen::VectorXd& motion) {
   const std::vector<PoseInformation> seen = pose_informations(refined, settings);
@@ -75,9 +76,8 @@ TEST_P(Evidence, OfErrorsAndMotionsIsThatOfTheWholeSystem) {
   settings.unknowns.scales = false;
   const Refinement refined = refined_scene(GetParam(), settings);
   const MotionEvidence evidence(refined, settings);
-  const ArmErrorLevel levels[] = {{0.05 * kDegree, 5e-4, 0, 1},
-                                  {0.02 * kDegree, 2e-4, 1e-3, 2},
-                                  {0.1 * kDegree, 1e-3, 4e-4, 0.5}};
+  const ArmErrorLevel levels[] = {
+      {0.05 * kDegree, 5e-4, 0, 1}, {0.02 * kDegree, 2e-4, 1e-3, 2}, {0.1 * kDegree, 1e-3, 4e-4, 0.5}};
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(6 * evidence.poses());
   Eigen::VectorXd motion = none;
   for (Eigen::Index i = 2; i < evidence.poses(); ++i)
@@ -88,8 +88,8 @@ TEST_P(Evidence, OfErrorsAndMotionsIsThatOfTheWholeSystem) {
     const MotionTerms terms = evidence.at(level);
     const double still = brute_deviance(refined, settings, level, none);
     EXPECT_NEAR(terms.deviance - still, offset, 1e-6 * std::abs(still) + 1e-3);
-    const double moved = terms.deviance + motion.dot(terms.information[0] * motion) -
-                         2 * motion.dot(terms.pull[0]);
+    const double moved =
+        terms.deviance + motion.dot(terms.information[0] * motion) - 2 * motion.dot(terms.pull[0]);
     const double rise = brute_deviance(refined, settings, level, motion) - still;
     EXPECT_NEAR(moved - terms.deviance, rise, 1e-4 * std::abs(rise));
   }
