@@ -132,7 +132,7 @@ knock-study: configure-test  ## Say whether hand-eye calibration sees knocks nea
 
 motion-study: configure-test  ## Say which motions hand-eye calibration claims and finds in subsets of real and drawn recordings, beside what could be found
 	cmake --build $(BUILD) -j $(JOBS) --target motion_study
-	$(BUILD)/tests/motion_study 10 5000001 ../shared/data/handeye $(BUILD)/corners
+	$(BUILD)/tests/motion_study 5 5000001 $(DATA)/handeye $(BUILD)/corners
 
 kinhec: configure-test  ## Say how pairs of the public benchmark KinHEC (pip install kinhec) are answered beside its own methods
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib

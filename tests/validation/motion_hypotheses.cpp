@@ -18,7 +18,8 @@ constexpr std::array<double, 4> kRotations{0.003, 0.012, 0.05, 0.2};            
 constexpr std::array<double, 4> kTranslations{0.03, 0.12, 0.5, 2};                         // [mm]
 constexpr std::array<double, 3> kFields{4e-4, 8e-4, 1.6e-3};                               // [rad]
 constexpr std::array<double, 2> kReaches{0.5, 2};
-constexpr double kNegligible = 8;  // of a log likelihood, below the largest
+constexpr double kWrongSize = 0.01, kWrongOdds = 50;  // of a view that is wrong by itself [m]
+constexpr double kNegligible = 8;                     // of a log likelihood, below the largest
 
 double log_sum(const std::vector<double>& values) {
   double largest = -std::numeric_limits<double>::infinity(), sum = 0;
@@ -68,14 +69,38 @@ double log_evidence(const Reduced& reduced, const Vector6d& sd) {
   return 0.5 * y.squaredNorm() - llt.matrixLLT().diagonal().array().log().sum();
 }
 
-Reduced reduced(const MotionTerms& terms, int mover, const std::vector<double>& shape) {
+/// The same terms where some poses have motions of their own as well; adds their evidence.
+struct Terms {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd pull;
+  double evidence = 0;
+};
+
+Terms with_own_motions(const MotionTerms& terms, int mover, const std::vector<std::size_t>& own,
+                       const Vector6d& sd) {
+  Terms result{terms.information[mover], terms.pull[mover]};
+  for (const std::size_t pose : own) {
+    const auto at = 6 * static_cast<Eigen::Index>(pose);
+    const Eigen::MatrixXd columns = result.information.middleCols<6>(at);
+    const Reduced one{columns.middleRows<6>(at), result.pull.segment<6>(at)};
+    result.evidence += log_evidence(one, sd);
+    Block inner = one.information;
+    inner.diagonal() += sd.cwiseAbs2().cwiseInverse();
+    const Eigen::LDLT<Block> ldlt(inner);
+    result.pull -= columns * ldlt.solve(one.pull);
+    result.information -= columns * ldlt.solve(columns.transpose());
+  }
+  return result;
+}
+
+Reduced reduced(const Terms& terms, const std::vector<double>& shape) {
   Reduced result;
   const auto n = static_cast<Eigen::Index>(shape.size());
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(6 * n, 6);
   for (Eigen::Index i = 0; i < n; ++i)
     if (const double share = shape[static_cast<std::size_t>(i)]; share != 0) {
-      T += share * terms.information[mover].middleCols<6>(6 * i);
-      result.pull += share * terms.pull[mover].segment<6>(6 * i);
+      T += share * terms.information.middleCols<6>(6 * i);
+      result.pull += share * terms.pull.segment<6>(6 * i);
     }
   for (Eigen::Index i = 0; i < n; ++i)
     result.information += shape[static_cast<std::size_t>(i)] * T.middleRows<6>(6 * i);
@@ -83,16 +108,16 @@ Reduced reduced(const MotionTerms& terms, int mover, const std::vector<double>& 
 }
 
 /// Of all borders in that order: poses from each on have moved.
-std::vector<Reduced> borders(const MotionTerms& terms, int mover, const std::vector<std::size_t>& order) {
+std::vector<Reduced> borders(const Terms& terms, const std::vector<std::size_t>& order) {
   std::vector<Reduced> list;
   Reduced sum;
-  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(terms.information[mover].rows(), 6);
+  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(terms.information.rows(), 6);
   for (std::size_t k = order.size() - 1; k > 0; --k) {
     const auto at = 6 * static_cast<Eigen::Index>(order[k]);
     const Block before = T.middleRows<6>(at);
-    sum.information += before + before.transpose() + terms.information[mover].block<6, 6>(at, at);
-    sum.pull += terms.pull[mover].segment<6>(at);
-    T += terms.information[mover].middleCols<6>(at);
+    sum.information += before + before.transpose() + terms.information.block<6, 6>(at, at);
+    sum.pull += terms.pull.segment<6>(at);
+    T += terms.information.middleCols<6>(at);
     list.push_back(sum);
   }
   return list;
@@ -129,20 +154,31 @@ std::vector<std::vector<std::size_t>> configuration_orders(const Bundle& bundle)
   return orders;
 }
 
-std::vector<double> shape_of(const MotionHypothesis& motion, std::size_t poses) {
+std::vector<double> shape_of(const MotionHypothesis& motion, const std::vector<int>& time, int last) {
   std::vector<double> shape;
-  for (std::size_t i = 0; i < poses; ++i)
-    shape.push_back(motion.drift ? static_cast<double>(i) / static_cast<double>(poses - 1)
-                                 : static_cast<double>(i >= motion.first));
+  for (const int t : time)
+    shape.push_back(motion.drift ? static_cast<double>(t) / last
+                                 : static_cast<double>(t >= static_cast<int>(motion.first)));
   return shape;
+}
+
+/// Views that were left out are wrong by themselves, but for those on a step's short side.
+std::vector<std::size_t> wrong_beside(const MotionHypothesis& motion, const TimedPoses& poses, int last) {
+  const auto first = static_cast<int>(motion.first);
+  const bool at_end = 2 * first > last;
+  std::vector<std::size_t> views;
+  for (std::size_t i = 0; i < poses.time.size(); ++i)
+    if (poses.left_out[i] && (motion.drift || (poses.time[i] >= first) != at_end)) views.push_back(i);
+  return views;
 }
 
 }  // namespace
 
-WeighedMotions weigh_motions(const Refinement& refined, const BundleSettings& settings) {
-  const MotionEvidence evidence(refined, settings);
-  const Bundle& bundle = refined.bundle;
+WeighedMotions weigh_motions(const TimedPoses& poses, const BundleSettings& settings) {
+  const MotionEvidence evidence(poses.refined, settings);
+  const Bundle& bundle = poses.refined.bundle;
   const std::size_t n = bundle.poses.size();
+  const int last = *std::max_element(poses.time.begin(), poses.time.end());
   double distance = 0;
   for (const BundleView& view : bundle.views)
     distance += predicted_pose(bundle, view).translation().norm() / static_cast<double>(bundle.views.size());
@@ -151,29 +187,43 @@ WeighedMotions weigh_motions(const Refinement& refined, const BundleSettings& se
     sd << Eigen::Vector3d::Constant(size), Eigen::Vector3d::Constant(size / distance);
     return sd;
   };
+  std::vector<std::size_t> left_out;
+  for (std::size_t i = 0; i < n; ++i)
+    if (poses.left_out[i]) left_out.push_back(i);
   WeighedMotions result;
   for (const bool camera : {true, false}) {
-    for (std::size_t first = 1; first < n; ++first) result.motions.push_back({camera, false, first});
+    for (int first = 1; first <= last; ++first)
+      result.motions.push_back({camera, false, static_cast<std::size_t>(first)});
     result.motions.push_back({camera, true});
   }
   const std::vector<std::vector<std::size_t>> orders = configuration_orders(bundle);
   const double of_size = -std::log(static_cast<double>(kSizes.size()));
   const double of_border = of_size - std::log(2.0 * static_cast<double>(orders.size() * (n - 1)));
+  const auto price = [](const std::vector<std::size_t>& wrong) {
+    return -static_cast<double>(wrong.size()) * std::log(kWrongOdds);
+  };
   constexpr double kNone = -std::numeric_limits<double>::infinity();
   std::vector<double> none, arm{kNone}, best(result.motions.size(), kNone);
   std::vector<std::vector<double>> logs(result.motions.size());
   double likeliest = kNone;
   for (const Level& level : levels()) {
     const MotionTerms terms = evidence.at(level.errors);
-    const double still = level.prior - 0.5 * terms.deviance;
-    none.push_back(still);
-    double top = still;
+    const double all = level.prior - 0.5 * terms.deviance;
+    const Terms still[2] = {with_own_motions(terms, 0, left_out, deviations(kWrongSize)),
+                            with_own_motions(terms, 1, left_out, deviations(kWrongSize))};
+    none.push_back(all + price(left_out) + still[0].evidence);
+    double top = none.back();
     for (std::size_t h = 0; h < logs.size(); ++h) {
       MotionHypothesis& motion = result.motions[h];
-      const Reduced one = reduced(terms, motion.camera ? 0 : 1, shape_of(motion, n));
+      const int mover = motion.camera ? 0 : 1;
+      const std::vector<std::size_t> wrong = wrong_beside(motion, poses, last);
+      const Terms partly =
+          wrong == left_out ? Terms{} : with_own_motions(terms, mover, wrong, deviations(kWrongSize));
+      const Terms& beside = wrong == left_out ? still[mover] : partly;
+      const Reduced one = reduced(beside, shape_of(motion, poses.time, last));
       for (const double size : kSizes) {
         const Vector6d sd = deviations(size);
-        const double value = still + of_size + log_evidence(one, sd);
+        const double value = all + price(wrong) + beside.evidence + of_size + log_evidence(one, sd);
         logs[h].push_back(value);
         top = std::max(top, value);
         if (value <= best[h]) continue;
@@ -187,10 +237,11 @@ WeighedMotions weigh_motions(const Refinement& refined, const BundleSettings& se
     likeliest = std::max(likeliest, top);
     if (top < likeliest - kNegligible) continue;
     for (const std::vector<std::size_t>& order : orders)
-      for (const int mover : {0, 1})
-        for (const Reduced& one : borders(terms, mover, order))
+      for (const Terms& of_mover : still)
+        for (const Reduced& one : borders(of_mover, order))
           for (const double size : kSizes)
-            arm.push_back(still + of_border + log_evidence(one, deviations(size)));
+            arm.push_back(all + price(left_out) + of_mover.evidence + of_border +
+                          log_evidence(one, deviations(size)));
   }
   const double nothing = log_sum(none);
   for (std::size_t h = 0; h < logs.size(); ++h) result.motions[h].evidence = log_sum(logs[h]) - nothing;

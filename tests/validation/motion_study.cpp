@@ -101,6 +101,22 @@ Recording subset(const Recording& all, std::size_t count, std::mt19937& random) 
   return some;
 }
 
+/// The solution's poses and, after them, those of views that do not fit.
+TimedPoses timed_poses(const Calibration& still, const Eigen::Matrix3Xd& points) {
+  TimedPoses poses;
+  poses.refined = still.refined;
+  poses.used = still.used.size();
+  poses.time = still.used;
+  poses.left_out.assign(poses.used, 0);
+  for (std::size_t i = 0; i < still.selection.views.size(); ++i) {
+    if (!still.selection.views[i].misfit) continue;
+    append_view(poses.refined.bundle, points, still.selection.observations[i]);
+    poses.time.push_back(static_cast<int>(i));
+    poses.left_out.push_back(1);
+  }
+  return poses;
+}
+
 Outcome outcome_of(const Recording& recording) {
   CalibrateSettings settings;
   settings.folds = 2;
@@ -116,7 +132,8 @@ Outcome outcome_of(const Recording& recording) {
     settings.motions = false;
     outcome.still = calibrate(recording.setup, recording.camera, recording.points, recording.symmetries,
                               recording.views, settings);
-    outcome.weighed = weigh_motions(outcome.still->refined, {.unknowns = outcome.still->unknowns});
+    outcome.weighed =
+        weigh_motions(timed_poses(*outcome.still, recording.points), {.unknowns = outcome.still->unknowns});
   } catch (const data::InputError& error) {
     outcome.lost = true;
     outcome.sentence = error.what();
