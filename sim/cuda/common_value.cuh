@@ -7,9 +7,9 @@ namespace flash::sim::cuda {
 /// and before all that they read next.
 template <typename Change>
 __device__ void change_common(const Change& change) {
-  __syncthreads();
-  if (threadIdx.x == 0) change();
-  __syncthreads();
+  synchronize_block();
+  if (block_rank() == 0) change();
+  synchronize_block();
 }
 
 /// A value that the threads of a block have in common, on chip. What a function takes by reference would else

@@ -1,9 +1,9 @@
 #pragma once
 #include "sim/cuda/environment_numbers.h"
-#include "sim/cuda/front_solve.cuh"
 #include "sim/cuda/own_vertices.cuh"
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_product.cuh"
+#include "sim/cuda/team_factor.cuh"
 #include "sim/cuda/team_sum.cuh"
 
 namespace flash::sim::cuda {
@@ -57,8 +57,7 @@ __device__ void solve(const FrontTables& fronts, const __half* factor, const Lin
 __device__ inline void restrict_to_free(const Restrictions& restrictions, float* x, bool copies) {
   if (restrictions.count == 0) return;
   synchronize_team();
-  const int first = copies ? static_cast<int>(threadIdx.x) : team_rank(),
-            step = copies ? block_threads : team_size();
+  const int first = copies ? block_rank() : team_rank(), step = copies ? block_size() : team_size();
   for (int k = first; k < restrictions.count; k += step) {
     const VertexRestriction& restriction = restrictions.list[k];
     float* own = x + 3 * restriction.place;

@@ -152,7 +152,7 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
     gather_contacts<decltype(kind)>(tables, step, contacts, list, of_place, left, count);
   });
   synchronize_team();
-  if (threadIdx.x == 0) step.restrictions.count = *count;
+  if (block_rank() == 0) step.restrictions.count = *count;
   synchronize_team();
 }
 

@@ -9,22 +9,33 @@ namespace flash::sim::cuda {
 /// Settings with panels that fit on chip beside the rest of a factorization.
 FrontSettings fitting_fronts(FrontSettings settings = {});
 
+/// Vectors that stay on the device.
+class DeviceVectors {
+ public:
+  /// Where the numbers of a vector are; null for none.
+  template <typename Number>
+  const Number* upload(const std::vector<Number>& numbers) {
+    const std::size_t bytes = numbers.size() * sizeof(Number);
+    arrays_.emplace_back(bytes);
+    arrays_.back().write(0, reinterpret_cast<const char*>(numbers.data()), bytes);
+    return reinterpret_cast<const Number*>(arrays_.back().data());
+  }
+
+ private:
+  std::vector<DeviceArray<char>> arrays_;
+};
+
 /// The bending of a material on the device, shared by the environments that have it.
 class DeviceBending {
  public:
   explicit DeviceBending(const SheetLayout& layout);
 
-  /// Sets what tables have of bending.
-  void put(SheetTables& sheet) const;
+  /// Tables with the bending in place of theirs.
+  SheetTables in(SheetTables sheet) const;
 
  private:
-  int bundle_count_, hinge_count_;
-  DeviceArray<int> group_rows_, bundle_starts_;
-  DeviceArray<StepColumns> step_columns_;
-  DeviceArray<double> step_values_, hinge_weights_, hinge_rest_angles_, hinge_rest_areas_;
-  DeviceArray<float> single_step_values_, stand_in_;
-  DeviceArray<int> hinge_vertices_, hinge_corner_starts_, hinge_corners_, hinge_source_starts_,
-      hinge_sources_;
+  DeviceVectors vectors_;
+  SheetTables tables_{};  ///< with no more than bending
 };
 
 /// The structure of a sheet on the device, once for all its environments.
@@ -39,18 +50,7 @@ class DevicePlan {
   SheetTables sheet{};  ///< with the bending of its layout
 
  private:
-  template <typename Number>
-  const Number* upload(const std::vector<Number>& numbers, std::vector<DeviceArray<Number>>& arrays);
-
-  DeviceBending bending_;
-  std::vector<DeviceArray<int>> ints_;
-  std::vector<DeviceArray<double>> doubles_;
-  std::vector<DeviceArray<FrontLayout>> fronts_;
-  std::vector<DeviceArray<FrontLevel>> levels_;
-  std::vector<DeviceArray<BlockPlace>> places_;
-  std::vector<DeviceArray<SolveChunk>> chunks_;
-  std::vector<DeviceArray<Gather>> gathers_;
-  std::vector<DeviceArray<EdgeSources>> sources_;
+  DeviceVectors vectors_;
 };
 
 }  // namespace flash::sim::cuda

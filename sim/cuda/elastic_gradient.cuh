@@ -13,12 +13,12 @@ namespace flash::sim::cuda {
 // 1,024 vertices, and most of the time goes by until they are there: so many are on their way at a time.
 
 /// Bytes on chip: sums over the team and places, where they fit.
-__host__ __device__ inline int gradient_memory(int size, bool places_on_chip) {
+FLASH_HOST_DEVICE inline int gradient_memory(int size, bool places_on_chip) {
   return static_cast<int>(sizeof(double)) * (most_sums * seats + (places_on_chip ? 3 * size : 0));
 }
 
 /// Bytes of what the triangles give.
-__host__ __device__ inline int gradient_share_memory(int triangles) {
+FLASH_HOST_DEVICE inline int gradient_share_memory(int triangles) {
   return 9 * static_cast<int>(sizeof(double)) * triangles;
 }
 
@@ -66,17 +66,17 @@ __device__ void add_up_gradient(const SheetTables& tables, const Places& place, 
     const int end = tables.corner_starts[vertex + 1];
     for (int first = tables.corner_starts[vertex]; first < end; first += together) {
       int corners[together];
-      Triple own[together];
+      Triple given[together];
 #pragma unroll
       for (int k = 0; k < together; ++k) corners[k] = tables.corners[min(first + k, end - 1)];
 #pragma unroll
       for (int k = 0; k < together; ++k) {
         const double* share = shares + corners[k];
-        own[k] = {share[0], share[tables.triangle_count], share[2 * tables.triangle_count]};
+        given[k] = {share[0], share[tables.triangle_count], share[2 * tables.triangle_count]};
       }
 #pragma unroll
       for (int k = 0; k < together; ++k)
-        if (first + k < end) sum = sum + own[k];
+        if (first + k < end) sum = sum + given[k];
     }
     own[0] = bent.x + sum.x;
     own[1] = bent.y + sum.y;
@@ -105,7 +105,7 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
       return triple(positions[vertex]) - origin;
   };
   if constexpr (places_on_chip) {
-    for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += block_threads) {
+    for (int vertex = block_rank(); vertex < tables.size; vertex += block_size()) {
       const Triple p = triple(positions[vertex]) - origin;
       near[3 * vertex] = p.x;
       near[3 * vertex + 1] = p.y;
@@ -116,7 +116,7 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
   multiply_scalar_rows(tables, tables.step_values, steps, place, [&](int row, int c, double sum) {
     gradient[3 * row + c] = environment.rigidity * sum;
   });
-  if (steps.are_sent()) __syncthreads();
+  if (steps.are_sent()) synchronize_block();
   triangle_gradients(tables, environment, place, shares.triangles, sums(membrane));
   if (tables.hinge_count > 0)
     hinge_gradients(tables, environment, start.angles, place, shares.hinges, sums(hinges));

@@ -255,8 +255,10 @@ __device__ inline void begin_damping(const Work& w, StepProblem& step) {
 __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const StepMotion& motion,
                                        double begin, double end) {
   if (motion.obstacle_count == 0) return;
-  place_obstacles(static_cast<int>(threadIdx.x), motion.obstacles, motion.obstacle_count, motion.poses,
-                  w.replay.frames, begin, end, w.obstacles);
+  for_ranks_below(motion.obstacle_count, [&](int k) {
+    w.obstacles[k] = placed_between(motion.obstacles[k], motion.poses, w.replay.frames, begin, end);
+  });
+  synchronize_team();
   change_common([&] {
     bool planes = true;
     for (int k = 0; k < motion.obstacle_count; ++k)
@@ -351,7 +353,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
     if (judged.finite) state.positions[i] = w.now.positions[i];
   }
   if (judged.finite) write_bristles(w.replay.sheet, step, w.now.contacts, state.bristles);
-  if (judged.finite && threadIdx.x == 0) step.at_start = w.now.elastic;
+  if (judged.finite && block_rank() == 0) step.at_start = w.now.elastic;
   synchronize_team();
   return solved;
 }

@@ -45,7 +45,7 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
                                      float* partial, char* chip) {
   const int size = 3 * sheet.size, first = team_rank(), step = team_size();
   // Each block fills its copy of a vector on chip.
-  const int first_of_copy = static_cast<int>(threadIdx.x);
+  const int first_of_copy = block_rank();
   float *search = reinterpret_cast<float*>(v.search), *preconditioned = v.solved + size;
   const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
   const Restrictions& restrictions = problem.restrictions;
@@ -62,7 +62,7 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
   const auto multiply_search = [&] {
     synchronize_team();
     if (v.near != v.search) {
-      for (int i = first_of_copy; i < 4 * sheet.size; i += block_threads)
+      for (int i = first_of_copy; i < 4 * sheet.size; i += block_size())
         reinterpret_cast<float*>(v.near)[i] = search[i];
       synchronize_team();
     }
@@ -101,7 +101,7 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
     const float* last = memory.basis + static_cast<long>(count) * size;
     synchronize_team();
     for (int i = v.solved_on_chip ? first_of_copy : first; i < size;
-         i += v.solved_on_chip ? block_threads : step)
+         i += v.solved_on_chip ? block_size() : step)
       preconditioned[i] = last[i];
     put_zero(fronts, v.solved);
     synchronize_team();

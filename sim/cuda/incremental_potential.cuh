@@ -361,7 +361,7 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
   };
   const VertexSums sums =
       step.obstacles.count == 0 ? balance(NoObstacles{}) : for_obstacles_of(step, balance);
-  if (threadIdx.x == 0) {
+  if (block_rank() == 0) {
     at.elastic = elastic;
     at.potential = sums.potential + damping + elastic.membrane + elastic.bending + springs.potential;
     at.residual = sqrt(sums.residual);

@@ -2,6 +2,7 @@
 #include "sim/cuda/hinges.cuh"
 #include "sim/cuda/membrane.cuh"
 #include "sim/cuda/membrane_damping.cuh"
+#include "sim/cuda/scalar_rows.cuh"
 #include "sim/cuda/team.cuh"
 
 namespace flash::sim::cuda {
@@ -22,7 +23,7 @@ inline constexpr int share_step = on_chip ? 9 : 12;
 inline constexpr int hessian_memory = block_threads * 3 * share_step<false>;
 
 /// On-chip numbers of a matrix whose triangles' shares are there too, behind nine numbers a thread.
-__host__ __device__ inline int hessian_memory_with_shares(int triangles) {
+FLASH_HOST_DEVICE inline int hessian_memory_with_shares(int triangles) {
   return 9 * block_threads + 3 * share_step<true> * triangles;
 }
 
@@ -33,8 +34,8 @@ __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers
                              const StepStart& start, const Point* positions, bool positive, float* shares,
                              float* chip) {
   constexpr int block_numbers = share_step<on_chip>, fours = 3 * share_step<false> / 4;
-  float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
-  for (int first = 32 * team_warp(); first < tables.triangle_count; first += team_size()) {
+  float4* own_chip = reinterpret_cast<float4*>(chip) + warp_lanes * fours * warp();
+  for (int first = warp_lanes * team_warp(); first < tables.triangle_count; first += team_size()) {
     const int t = min(first + lane(), tables.triangle_count - 1);
     const TriangleFrame f = triangle_frame(tables, t, [&](int vertex) { return triple(positions[vertex]); });
     PrincipalResponse<double> response = response_at(environment, f.frame.s1, f.frame.s2);
@@ -75,17 +76,17 @@ __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers
         for (int e = 0; e < block_numbers; ++e) shares[block_numbers * (3 * t + b) + e] = numbers[e];
       } else {
 #pragma unroll
-        for (int k = 0; k < block_numbers / 4; ++k)
-          own_chip[fours * lane() + block_numbers / 4 * b + k] = {numbers[4 * k], numbers[4 * k + 1],
-                                                                  numbers[4 * k + 2], numbers[4 * k + 3]};
+        for (int e = 0; e < block_numbers / 4; ++e)
+          own_chip[fours * lane() + block_numbers / 4 * b + e] = {numbers[4 * e], numbers[4 * e + 1],
+                                                                  numbers[4 * e + 2], numbers[4 * e + 3]};
       }
     }
     if constexpr (on_chip) continue;
-    __syncwarp();
-    const int count = fours * min(32, tables.triangle_count - first);
+    synchronize_warp();
+    const int count = fours * min(warp_lanes, tables.triangle_count - first);
     float4* to = reinterpret_cast<float4*>(shares) + fours * first;
-    for (int i = lane(); i < count; i += 32) to[i] = own_chip[i];
-    __syncwarp();
+    for (int i = lane(); i < count; i += warp_lanes) to[i] = own_chip[i];
+    synchronize_warp();
   }
   if (start.metrics == nullptr) return;
   synchronize_team();
@@ -177,22 +178,17 @@ __device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumb
 template <bool on_chip>
 __device__ void assemble_block_rows(const SheetTables& tables, const EnvironmentNumbers& environment,
                                     const float* shares, float* rows, float* chip) {
-  static_assert(slice_size == 32);
   float* own_chip = chip + slice_numbers * warp();
   const auto write = [&](int slot, const Block& block) {
-    __syncwarp();
-#pragma unroll
-    for (int e = 0; e < 9; ++e) own_chip[3 * slice_size * (e / 3) + 3 * lane() + e % 3] = block.numbers[e];
-    __syncwarp();
-    float* to = rows + static_cast<long>(slot / slice_size) * slice_numbers + lane();
-#pragma unroll
-    for (int e = 0; e < 9; ++e) to[32 * e] = own_chip[32 * e + lane()];
+    write_slice_block(block.numbers, slot % slice_size,
+                      rows + static_cast<long>(slot / slice_size) * slice_numbers, own_chip);
   };
-  for (int slice = team_warp(); slice_size * slice < tables.size; slice += team_warps()) {
-    const int vertex = slice_size * slice + lane();
-    const Block diagonal = go_through_row<on_chip>(tables, environment, vertex, shares, write);
-    write(tables.slice_starts[slice] * slice_size, diagonal);
-  }
+  for (int slice = team_warp(); slice_size * slice < tables.size; slice += team_warps())
+    for_lanes([&](int lane) {
+      const int vertex = slice_size * slice + lane;
+      const Block diagonal = go_through_row<on_chip>(tables, environment, vertex, shares, write);
+      write(tables.slice_starts[slice] * slice_size + lane, diagonal);
+    });
 }
 
 /// Adds what the hinges give to block b of the pattern.
@@ -240,8 +236,8 @@ template <bool on_chip>
 __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumbers& environment,
                                 const Restrictions& restrictions, const HingeMatrix& hinges,
                                 const float* shares, float* blocks, float* chip) {
-  float* own_chip = chip + 9 * 32 * warp();
-  for (int first = 32 * team_warp(); first < tables.block_count; first += team_size()) {
+  float* own_chip = chip + 9 * warp_lanes * warp();
+  for (int first = warp_lanes * team_warp(); first < tables.block_count; first += team_size()) {
     const int b = min(first + lane(), tables.block_count - 1);
     Block block = b < tables.size ? go_through_row<on_chip>(tables, environment, tables.block_rows[b], shares,
                                                             [](int, const Block&) {})
@@ -253,10 +249,10 @@ __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumb
     if (hinges.gradients != nullptr) add_hinge_blocks(tables, hinges, b, block);
     if (restrictions.of_place != nullptr) restrict_block(tables, restrictions, b, block);
     for (int e = 0; e < 9; ++e) own_chip[9 * lane() + e] = block.numbers[e];
-    __syncwarp();
-    const int count = 9 * min(32, tables.block_count - first);
-    for (int i = lane(); i < count; i += 32) blocks[9L * first + i] = own_chip[i];
-    __syncwarp();
+    synchronize_warp();
+    const int count = 9 * min(warp_lanes, tables.block_count - first);
+    for (int i = lane(); i < count; i += warp_lanes) blocks[9L * first + i] = own_chip[i];
+    synchronize_warp();
   }
 }
 

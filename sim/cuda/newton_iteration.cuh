@@ -2,10 +2,10 @@
 #include "sim/cuda/common_value.cuh"
 #include "sim/cuda/conjugate_gradients.cuh"
 #include "sim/cuda/contact.cuh"
-#include "sim/cuda/front_factor.cuh"
 #include "sim/cuda/generalized_residuals.cuh"
 #include "sim/cuda/incremental_potential.cuh"
 #include "sim/cuda/membrane_hessian.cuh"
+#include "sim/cuda/team_factor.cuh"
 
 namespace flash::sim::cuda {
 
@@ -106,8 +106,7 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
                              matrix_shares<on_chip>(w), w.memory.blocks, chip);
   });
   count_phase(w.memory, ReplayPhase::preconditioner);
-  const bool positive =
-      factorize<half_parts>(w.replay.fronts, w.memory.blocks, w.memory.updates, w.memory.factor, chip);
+  const bool positive = factorize(w.replay, w.memory, chip);
   const bool failed = any_of_team(!positive);
   count_phase(w.memory, ReplayPhase::factorization);
   return !failed;

@@ -29,22 +29,17 @@ __device__ inline Frame<double> carried(const Frame<double>& by, const Frame<dou
           place_from(by, place.origin)};
 }
 
-/// Writes the obstacles between two shares of a step, thread k of them the k-th. `poses`: of the frames at
-/// the start of the step; those at its end follow after `frames` of them.
-__device__ inline void place_obstacles(int k, const PlacedObstacle* placed, int count, const FramePose* poses,
-                                       int frames, double begin, double end,
-                                       MovingObstacle<double>* obstacles) {
-  if (k < count) {
-    const PlacedObstacle& own = placed[k];
-    MovingObstacle<double> moving = own.obstacle;
-    if (moving.moves) {
-      const FramePose &from = poses[own.frame], &to = poses[frames + own.frame];
-      moving.start = carried(pose_between(from, to, begin), own.obstacle.start);
-      moving.end = carried(pose_between(from, to, end), own.obstacle.start);
-    }
-    obstacles[k] = moving;
+/// An obstacle between two shares of a step. `poses`: of the frames at the start of the step; those at its
+/// end follow after `frames` of them.
+__device__ inline MovingObstacle<double> placed_between(const PlacedObstacle& placed, const FramePose* poses,
+                                                        int frames, double begin, double end) {
+  MovingObstacle<double> moving = placed.obstacle;
+  if (moving.moves) {
+    const FramePose &from = poses[placed.frame], &to = poses[frames + placed.frame];
+    moving.start = carried(pose_between(from, to, begin), placed.obstacle.start);
+    moving.end = carried(pose_between(from, to, end), placed.obstacle.start);
   }
-  synchronize_team();
+  return moving;
 }
 
 }  // namespace flash::sim::cuda

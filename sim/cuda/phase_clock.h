@@ -39,6 +39,14 @@ struct PhaseClock {
     ticks[replay_phases] = now;
   }
 };
+#else
+/// The serial team counts no time.
+struct PhaseClock {
+  long long* ticks = nullptr;
+
+  void start() const {}
+  void count(ReplayPhase) const {}
+};
 #endif
 
 }  // namespace flash::sim::cuda

@@ -127,9 +127,11 @@ __device__ __noinline__ void begin_step(const ProjectiveWork<keeping>& w, StepPr
     m.held_axes[i] = 0;
     m.reactions[i] = {0, 0, 0, 0};
   }
-  if (motion.obstacle_count > 0)
-    place_obstacles(team_rank(), motion.obstacles, motion.obstacle_count, motion.poses,
-                    w.numbers.replay.frames, 0, 1, m.obstacles);
+  if (motion.obstacle_count > 0) {
+    if (const int k = team_rank(); k < motion.obstacle_count)
+      m.obstacles[k] = placed_between(motion.obstacles[k], motion.poses, w.numbers.replay.frames, 0, 1);
+    synchronize_team();
+  }
   const VertexContacts contacts(m, step.size, motion.obstacle_count);
   for (int i = team_rank(); i < step.size; i += team_size())
     for (int k = 0; k < motion.obstacle_count; ++k) {

@@ -8,8 +8,7 @@
 #include "sim/cuda/device_arena.h"
 #include "sim/cuda/replay_checks.h"
 #include "sim/cuda/replay_kernel.h"
-#include "sim/law/membrane.h"
-#include "sim/step/moving_obstacles.h"
+#include "sim/cuda/replay_records.h"
 
 namespace flash::sim::cuda {
 
@@ -17,50 +16,11 @@ using data::Points;
 
 namespace {
 
-ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& environment) {
-  const data::SheetMaterial& m = environment.material;
-  const SheetLame lame = sheet_lame(m.membrane_stiffness, m.poissons_ratio);
-  const Membrane membrane = membrane_of(m.constitutive, lame);
-  const double gravity = environment.gravity.norm(), weight_factor = gravity > 0 ? gravity : 9.81;
-  return {.law = membrane.law,
-          .lame = membrane.lame,
-          .damping = {lame.mu, m.constitutive == data::Constitutive::tri_arap ? 0 : lame.lambda},
-          .membrane_stiffness = m.membrane_stiffness,
-          .rigidity = m.bending_rigidity,
-          .areal_density = m.areal_density,
-          .air_drag = m.air_drag,
-          .stiffness_damping = m.stiffness_damping,
-          .gravity = {environment.gravity.x(), environment.gravity.y(), environment.gravity.z()},
-          .weight_factor = weight_factor,
-          .force_scale = m.areal_density * plan.sheet.vertex_area.norm() * weight_factor,
-          .bending_rounding = 2 * m.bending_rigidity * bending_operator(plan, m).flat_energy,
-          .obstacle_count = static_cast<int>(environment.obstacles.size()),
-          .several = stand_beside(environment.obstacles)};
-}
-
 std::size_t most_obstacles_of(const std::vector<ReplayEnvironment>& environments) {
   std::size_t most = 0;
   for (const ReplayEnvironment& e : environments) most = std::max(most, e.obstacles.size());
   return most;
 }
-
-/// Rows of `points` from `first` on in the order of elimination; zeros where there are none.
-void put_in_order(const Points& points, Eigen::Index first, const std::vector<int>& order, Point* to) {
-  for (const int vertex : order) {
-    const Eigen::Index row = first + vertex;
-    *to++ = row < points.rows() ? Point{points(row, 0), points(row, 1), points(row, 2), 0} : Point{};
-  }
-}
-
-std::vector<PlacedObstacle> placed_obstacles(const ReplayEnvironment& environment) {
-  std::vector<PlacedObstacle> placed;
-  for (const Obstacle& obstacle : environment.obstacles)
-    placed.push_back({obstacle_in_frame(obstacle, environment.material.friction), obstacle.frame});
-  return placed;
-}
-
-constexpr SolverState no_solver = {
-    .step = -1, .refactor = 1, .spring_count = 0, .held_count = 0, .at_start = {}};
 
 }  // namespace
 
@@ -205,17 +165,15 @@ void ReplayMemory::write_velocities(int environment, const Points& v) {
 }
 
 SheetTables ReplayMemory::with_bending_of(const data::SheetMaterial& material, int environment) {
-  SheetTables own = plan.sheet;
   std::shared_ptr<const DeviceBending>& bending = bendings_[static_cast<std::size_t>(environment)];
   bending.reset();
   const BendingOperator& asked = bending_operator(*sheet_, material);
-  if (&asked == plan_bending_) return own;
+  if (&asked == plan_bending_) return plan.sheet;
   std::weak_ptr<const DeviceBending>& shared = shared_bendings_[&asked];
   bending = shared.lock();
   if (bending == nullptr)
     shared = bending = std::make_shared<const DeviceBending>(lay_out_bending(*sheet_, asked, front_plan));
-  bending->put(own);
-  return own;
+  return bending->in(plan.sheet);
 }
 
 void ReplayMemory::write_environment(const ReplayEnvironment& environment, int number) {
@@ -409,10 +367,6 @@ std::vector<ReplayStep> steps_of(std::span<const ReplayStats> stats) {
     steps.push_back(
         {s.residual, s.penetration, s.iterations, s.solves, s.factorizations, s.substeps, s.converged != 0});
   return steps;
-}
-
-void put_points(const Point* points, const std::vector<int>& order, Eigen::Ref<Points> to) {
-  for (std::size_t i = 0; i < order.size(); ++i) to.row(order[i]) << points[i].x, points[i].y, points[i].z;
 }
 
 }  // namespace flash::sim::cuda

@@ -1,4 +1,5 @@
 #pragma once
+#include <cuda_fp16.h>
 #include <cuda_runtime.h>
 
 #include <map>
@@ -119,8 +120,5 @@ struct ReplayMemory {
 };
 
 std::vector<ReplayStep> steps_of(std::span<const ReplayStats> stats);
-
-/// `points`: by order of elimination, which `order` has the vertices of.
-void put_points(const Point* points, const std::vector<int>& order, Eigen::Ref<data::Points> to);
 
 }  // namespace flash::sim::cuda

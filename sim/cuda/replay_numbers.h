@@ -1,6 +1,4 @@
 #pragma once
-#include <cuda_fp16.h>
-
 #include "sim/cuda/contact_records.h"
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/four.h"
@@ -9,6 +7,8 @@
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/cuda/vertex_records.h"
+
+struct __half;  // of CUDA
 
 namespace flash::sim::cuda {
 
@@ -76,7 +76,7 @@ struct ReplayStats {
   int converged;
 
   /// What it took, in solves, about: by the parts of steps of 1,024 vertices on one processor.
-  __host__ __device__ int work() const { return solves + 2 * iterations + 8 * factorizations; }
+  FLASH_HOST_DEVICE int work() const { return solves + 2 * iterations + 8 * factorizations; }
 };
 
 /// Directions that the generalized minimal residual method keeps, all of them.
@@ -127,7 +127,7 @@ struct TeamMemory {
 struct SheetState {
   Point *positions, *velocities, *bristles;
 
-  __host__ __device__ SheetState of(long environment, int size, int obstacles) const {
+  FLASH_HOST_DEVICE SheetState of(long environment, int size, int obstacles) const {
     return {positions + environment * size, velocities + environment * size,
             bristles + environment * obstacles * size};
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sim/cuda/replay_records.h"
+
 namespace flash::sim::cuda {
 
 char* ReplayReader::room(std::size_t bytes) {

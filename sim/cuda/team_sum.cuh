@@ -11,7 +11,7 @@ inline constexpr int seats = most_team_blocks * block_warps;
 
 template <typename Number>
 __device__ Number sum_over_warp(Number value) {
-  for (int offset = 16; offset > 0; offset /= 2) value += __shfl_xor_sync(0xffffffffu, value, offset);
+  for (int offset = warp_lanes / 2; offset > 0; offset /= 2) value += across_warp(value, offset);
   return value;
 }
 
@@ -24,20 +24,20 @@ template <int count, int together = 1, typename Number, typename Load, typename 
 __device__ void add_up(int n, Number* partial, const Load& load, const Use& use) {
   static_assert(count <= most_sums);
   const int warps = team_warps();
-  for (int first = team_warp(); first < seats && 32 * first < n; first += together * warps) {
+  for (int first = team_warp(); first < seats && warp_lanes * first < n; first += together * warps) {
     Number values[together][count] = {};
-    for (int base = 32 * first + lane(); base < n; base += 32 * seats) {
+    for (int base = warp_lanes * first + lane(); base < n; base += warp_lanes * seats) {
       decltype(load(0)) loaded[together];
       bool there[together];
 #pragma unroll
       for (int k = 0; k < together; ++k) {
-        const int i = base + 32 * k * warps;
+        const int i = base + warp_lanes * k * warps;
         there[k] = i < n && first + k * warps < seats;
         loaded[k] = load(there[k] ? i : base);
       }
 #pragma unroll
       for (int k = 0; k < together; ++k)
-        if (there[k]) use(base + 32 * k * warps, loaded[k], values[k]);
+        if (there[k]) use(base + warp_lanes * k * warps, loaded[k], values[k]);
     }
 #pragma unroll
     for (int k = 0; k < together; ++k)
@@ -63,9 +63,9 @@ __device__ void add_up(int n, Number* partial, const Own& own) {
 /// A sum over n items that add_up has left at `partial`, behind a barrier.
 template <typename Number>
 __device__ Number total(int n, const Number* partial) {
-  const int used = min(seats, (n + 31) / 32);
+  const int used = min(seats, (n + warp_lanes - 1) / warp_lanes);
   Number sum = 0;
-  for (int seat = lane(); seat < used; seat += 32) sum += partial[seat];
+  for (int seat = lane(); seat < used; seat += warp_lanes) sum += partial[seat];
   return sum_over_warp(sum);
 }
 
@@ -87,8 +87,8 @@ __device__ Number worse_of(Number worst, Number other) {
 }
 
 __device__ inline double worst_over_warp(double value) {
-  for (int offset = 16; offset > 0; offset /= 2)
-    value = worse_of(value, __shfl_xor_sync(0xffffffffu, value, offset));
+  for (int offset = warp_lanes / 2; offset > 0; offset /= 2)
+    value = worse_of(value, across_warp(value, offset));
   return value;
 }
 
@@ -100,7 +100,7 @@ __device__ inline double worst_over_team(double value, double* partial) {
   if (lane() == 0) put_in_all(partial + team_warp(), value);
   synchronize_team();
   double worst = 0;
-  for (int w = lane(); w < team_warps(); w += 32) worst = worse_of(worst, partial[w]);
+  for (int w = lane(); w < team_warps(); w += warp_lanes) worst = worse_of(worst, partial[w]);
   return worst_over_warp(worst);
 }
 

@@ -1,5 +1,4 @@
-// What holds do over a step, as a device is told of it; no device is needed.
-#ifdef FLASH_HAVE_CUDA
+// What holds do over a step, as a device is told of it.
 #include "sim/cuda/hold_motion.h"
 
 #include <gtest/gtest.h>
@@ -77,4 +76,3 @@ TEST(HoldMotion, SpringsDoSoToo) {
 
 }  // namespace
 }  // namespace flash::sim::cuda
-#endif

@@ -1,0 +1,205 @@
+// What a device computes of an iterate, by its own text on the processor: beside the processor's potential,
+// and beside finite differences.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <limits>
+
+#include "sim/cuda/hold_motion.h"
+#include "sim/newton/active_set.h"
+#include "sim/newton/step_problem.h"
+#include "tests/sim/cuda/serial_replay.h"
+#include "tests/sim/properties/drawn_world.h"
+
+namespace flash::sim::cuda {
+namespace {
+
+using data::Points;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon(),
+                 single_epsilon = std::numeric_limits<float>::epsilon();
+
+/// A world before a step of `h`, and a place near the end of that step.
+struct Drawn {
+  std::shared_ptr<const SheetPlan> plan = make_sheet_plan(draw_sheet());
+  Environment environment;
+  double h = draw_log(2e-3, 2e-2);
+  Points positions;
+
+  explicit Drawn(Environment (*draw_environment)(const Sheet&)) : environment(draw_environment(plan->sheet)) {
+    for (Hold& hold : environment.holds)
+      if (hold.axes == std::array{true, true, true} && draw_chance(0.5)) {
+        hold.stiffness.resize(std::ssize(hold.vertices));
+        for (double& own : hold.stiffness)
+          own = draw_chance(0.2) ? std::numeric_limits<double>::infinity() : draw_log(1e-2, 1e3);
+      }
+    positions = environment.state.positions + h * environment.state.velocities;
+    positions += draw_noise(positions.rows(), draw(0, 0.05) * cell());
+  }
+
+  double cell() const { return std::sqrt(plan->sheet.vertex_area.mean()); }
+
+  SerialReplay serial() const {
+    ReplaySettings settings;
+    settings.time_step = h;
+    settings.steps = 1;
+    Environment moved = environment;
+    const auto springs = motion_of_springs(moved, h, 1);
+    const auto holds = std::make_shared<const HoldMotion>(motion_of_holds(moved, h, 1));
+    return {plan, replay_environment(environment, holds, springs), settings, draw_chance(0.5)};
+  }
+};
+
+/// The same by the processor.
+struct Processor {
+  std::shared_ptr<const SheetPlan> plan;
+  Environment environment;
+  StepProblem problem;
+  Iterate at;
+
+  explicit Processor(const Drawn& drawn)
+      : plan(drawn.plan), environment(begun(drawn)), problem(*plan, environment, drawn.h, {.speed = 1}) {
+    at.positions = drawn.positions;
+    Points carried = at.positions;
+    at.contacts = begin_step(problem.contacts, carried);
+    problem.evaluate(at);
+  }
+
+  const BodyLaw& law() const { return problem.laws.front(); }
+  double rigidity() const { return problem.potential.effective_rigidity(law()); }
+
+  /// The Hessian's blocks with those of contact, without quadratic bending.
+  BlockValues<double> blocks(bool positive) const {
+    BlockValues<double> values;
+    problem.potential.assemble(at.positions, positive ? Curvature::positive : Curvature::exact, false,
+                               values);
+    add_slip_stiffness(at.contacts, values);
+    if (!positive) add_surface_curvature(at.contacts, values);
+    return values;
+  }
+  Points product(const BlockValues<double>& values, const Points& x) const {
+    Points y = Points::Zero(x.rows(), 3);
+    const auto block = [&](std::size_t k) { return Eigen::Map<const Matrix3d>(values.data() + 9 * k); };
+    for (Eigen::Index i = 0; i < x.rows(); ++i)
+      y.row(i) += x.row(i) * block(static_cast<std::size_t>(i)).transpose();
+    for (std::size_t k = 0; k < plan->pattern.pairs.size(); ++k) {
+      const auto [row, column] = plan->pattern.pairs[k];
+      const auto own = block(static_cast<std::size_t>(plan->pattern.size) + k);
+      y.row(row) += x.row(column) * own.transpose();
+      y.row(column) += x.row(row) * own;
+    }
+    return y;
+  }
+  /// The largest entry of the matrix of the linear problem [N/m].
+  double stiffness() const {
+    const BlockValues<double> values = blocks(false);
+    double largest = rigidity() * law().bending.largest_entry;
+    for (const double entry : values) largest = std::max(largest, std::abs(entry));
+    return largest;
+  }
+
+ private:
+  static Environment begun(const Drawn& drawn) {
+    Environment environment = drawn.environment;
+    update_holds(environment, environment.state.time + drawn.h);
+    return environment;
+  }
+};
+
+// Forces are positions, rounded, times stiffness, added up over some tens of neighbours.
+RC_GTEST_PROP(SerialPotential, ForcesAndEnergiesAreThoseOfTheProcessor, ()) {
+  const Drawn drawn(draw_world);
+  SerialReplay serial = drawn.serial();
+  const Processor processor(drawn);
+  const SerialIterate own = serial.evaluate(drawn.positions);
+  const Iterate& other = processor.at;
+  const double rounded = 64 * epsilon * drawn.positions.cwiseAbs().maxCoeff() * processor.stiffness();
+  const auto largest = [](const Points& x) { return x.rowwise().norm().maxCoeff(); };
+  RC_ASSERT(largest(own.force - other.force) <= rounded);
+  RC_ASSERT(largest(own.residual - other.residual) <= rounded);
+  const double work = rounded * drawn.positions.size() * drawn.cell();
+  RC_ASSERT(std::abs(own.potential - other.incremental_potential) <= work + 64 * epsilon * own.potential);
+  RC_ASSERT(std::abs(own.elastic.membrane - other.elastic.membrane) <= work);
+  RC_ASSERT(std::abs(own.elastic.bending - other.elastic.bending) <= work);
+  RC_ASSERT(std::abs(own.friction - friction_potential(processor.problem.contacts, other.contacts,
+                                                       other.positions)) <= work);
+  RC_ASSERT(own.balanced == processor.problem.balanced(other, ReplaySettings{}.tolerance));
+  RC_CLASSIFY(other.contacts.constraints.size() > other.contacts.held, "touches");
+  RC_CLASSIFY(own.friction > 0, "rubs");
+}
+
+// Central differences over t and 2t part by three times what the first are off by.
+RC_GTEST_PROP(SerialPotential, ForcesAreTheSlopeOfThePotential, ()) {
+  const Drawn drawn(draw_world);
+  SerialReplay serial = drawn.serial();
+  const SerialIterate at = serial.evaluate(drawn.positions);
+  const double t = 1e-4 * drawn.cell();
+  const Points way = draw_noise(drawn.positions.rows(), 1);
+  const auto slope = [&](double length) {
+    return (serial.evaluate(drawn.positions + length * way).potential -
+            serial.evaluate(drawn.positions - length * way).potential) /
+           (2 * length);
+  };
+  const double once = slope(t), twice = slope(2 * t), expected = at.force.cwiseProduct(way).sum();
+  const double rounded = 64 * epsilon * (at.potential + at.force.cwiseAbs().sum() * drawn.cell()) / t;
+  RC_ASSERT(std::abs(once - expected) <= std::abs(twice - once) + rounded);
+}
+
+RC_GTEST_PROP(SerialPotential, TheMatrixIsThatOfTheProcessor, ()) {
+  const Drawn drawn(draw_world);
+  SerialReplay serial = drawn.serial();
+  const Processor processor(drawn);
+  const Points x = draw_noise(drawn.positions.rows(), 1);
+  for (const bool positive : {false, true}) {
+    const Points own = serial.matrix_product(drawn.positions, positive, x),
+                 other = processor.product(processor.blocks(positive), x) +
+                         bending_product(processor.law().bending, processor.rigidity(), x);
+    // Up to fifty neighbours with three numbers each, in single precision.
+    const double rounded = 150 * single_epsilon * processor.stiffness();
+    RC_ASSERT((own - other).cwiseAbs().maxCoeff() <= rounded);
+  }
+}
+
+// Where neither hinges nor the turn of damping are left out, the matrix is the slope of the forces.
+RC_GTEST_PROP(SerialPotential, TheMatrixIsTheSlopeOfTheForces, ()) {
+  Drawn drawn(draw_flight);
+  data::SheetMaterial& material = drawn.environment.materials[0];
+  if (material.bending_model == data::BendingModel::hinge) material.bending_model = data::BendingModel::plate;
+  material.stiffness_damping = 0;
+  SerialReplay serial = drawn.serial();
+  const double t = 1e-4 * drawn.cell();
+  const Points way = draw_noise(drawn.positions.rows(), 1);
+  const auto slope = [&](double length) -> Points {
+    return (serial.evaluate(drawn.positions + length * way).force -
+            serial.evaluate(drawn.positions - length * way).force) /
+           (2 * length);
+  };
+  const Points once = slope(t), twice = slope(2 * t),
+               product = serial.matrix_product(drawn.positions, false, way);
+  const double stiffness = Processor(drawn).stiffness(),
+               rounded = 64 * epsilon * drawn.positions.cwiseAbs().maxCoeff() / t * stiffness +
+                         150 * single_epsilon * stiffness;
+  RC_ASSERT((once - product).cwiseAbs().maxCoeff() <= (twice - once).cwiseAbs().maxCoeff() + rounded);
+}
+
+// A factor solves a system near the given one, as near as its blocks are rounded: its residual is small,
+// whatever the condition is.
+RC_GTEST_PROP(SerialPotential, TheFactorIsThatOfTheRestrictedMatrix, ()) {
+  const Drawn drawn(draw_world);
+  SerialReplay serial = drawn.serial();
+  const Processor processor(drawn);
+  BlockValues<double> values = processor.blocks(true);
+  for (const BodyLaw& law : processor.problem.laws)
+    add_bending_stand_in(law.bending, processor.problem.potential.effective_rigidity(law), values);
+  double largest = 0;
+  for (const double entry : values) largest = std::max(largest, std::abs(entry));
+  restrict_matrix(processor.plan->pattern, processor.at.contacts, values);
+  const Points b = draw_noise(drawn.positions.rows(), 1), solved = serial.factor_solve(drawn.positions, b);
+  const double rounded = 150 * single_epsilon * (largest * solved.cwiseAbs().maxCoeff() + 1);
+  RC_ASSERT((processor.product(values, solved) - b).cwiseAbs().maxCoeff() <= rounded);
+}
+
+}  // namespace
+}  // namespace flash::sim::cuda
