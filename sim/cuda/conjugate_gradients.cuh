@@ -5,6 +5,7 @@
 #include "sim/cuda/sheet_product.cuh"
 #include "sim/cuda/team_factor.cuh"
 #include "sim/cuda/team_sum.cuh"
+#include "sim/newton/step_numbers.h"
 
 namespace flash::sim::cuda {
 
@@ -29,9 +30,6 @@ struct LinearEnd {
   int solves;            ///< with the factor
   float first_residual;  ///< norm of that at the start
 };
-
-/// Share of the first residual that a linear problem is solved to, as on the CPU.
-inline constexpr float linear_share = 0.1f;
 
 /// Memory of a team, three numbers a vertex but where said.
 struct LinearVectors {
@@ -115,13 +113,12 @@ __device__ inline Numbers3 free_part(const Restrictions& restrictions, int verte
 inline constexpr int linear_partials = 2 * seats;
 
 /// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
-/// at a share of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
-/// `partial`, `chip`: on chip, linear_partials and solve_memory. What it returns all threads get.
+/// at a share of the residual, at the tolerance, where the matrix curves down, after `most_solves`
+/// iterations. `partial`, `chip`: on chip, linear_partials and solve_memory. What it returns all threads get.
 template <int parts>
 __device__ LinearEnd conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
                                          const LinearProblem& problem, const LinearVectors& v,
                                          float* direction, float* change, float* partial, char* chip) {
-  constexpr int most = 20;
   const int size = sheet.size;
   float *residual = v.residual, *preconditioned = v.solved + 3 * size;
   const Restrictions& restrictions = problem.restrictions;
@@ -201,9 +198,9 @@ __device__ LinearEnd conjugate_gradients(const FrontTables& fronts, const SheetT
         });
   };
   float norm = take_residual(starts_elsewhere ? 1.0f : 0.0f), previous = 0;
-  const float first_residual = norm, target = fmaxf(linear_share * norm, problem.tolerance);
+  const float first_residual = norm, target = fmaxf(static_cast<float>(enough) * norm, problem.tolerance);
   int iteration = 0;
-  while (norm > target && iteration < most) {
+  while (norm > target && iteration < most_solves) {
     ++iteration;
     v.clock.count(ReplayPhase::directions);
     solve<parts>(fronts, problem.factor, v, chip);

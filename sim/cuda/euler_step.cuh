@@ -167,7 +167,6 @@ __device__ __noinline__ SpringEnd judge_springs(const Work& w, const StepProblem
 
 /// The end of a step, its energy as account_for_energy of the CPU has it.
 __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
-  constexpr double energy_tolerance = 1e-2, gap_tolerance = 1e-9;
   const SheetTables& tables = w.replay.sheet;
   const ReplayMaterial& material = *step.material;
   enum {
@@ -207,24 +206,28 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
   const double per_step = 1 / (step.h * step.h);
   const double stored_at_start = step.at_start.membrane + step.at_start.bending,
                stored_at_end = w.now.elastic.membrane + w.now.elastic.bending;
-  const double gain = per_step * sums[kinetic] - sums[kinetic_at_start] + stored_at_end - stored_at_start -
-                      sums[falls] - sums[work];
-  const double there =
-      sums[kinetic_at_start] + stored_at_start + fmax(0.0, sums[falls]) + fmax(0.0, sums[work]);
-  const double rounding = material.bending_rounding + 1e-9 * sums[mass_sum] * material.weight_factor +
-                          1e-14 * material.membrane_stiffness * sums[mass_sum] / material.areal_density;
-  const double allowed = energy_tolerance * there + sums[unbalanced] + contact.bristles + rounding;
+  const EnergyAccount energy = {
+      sums[kinetic_at_start],
+      per_step * sums[kinetic],
+      stored_at_start,
+      stored_at_end,
+      sums[falls],
+      sums[work],
+      sums[unbalanced],
+      contact.bristles,
+      material.bending_rounding + rounding_of_weight(sums[mass_sum], material.weight_factor) +
+          rounding_of_membrane(sums[mass_sum], material.membrane_stiffness, material.areal_density)};
   const bool finite = isfinite(sums[kinetic]);
-  const bool complementary = contact.complementarity <= gap_tolerance;
+  const bool complementary = is_complementary(contact.complementarity);
   StepEnd end = {false,
                  finite,
                  contact.penetration,
                  contact.start_depth,
                  contact.complementarity,
                  per_step * sums[kinetic]};
-  if (!(gain <= allowed) || !complementary) return end;
-  const bool falls_below_start =
-      w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + springs.at_start + allowed;
+  if (!energy.balances() || !complementary) return end;
+  const bool falls_below_start = w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start +
+                                                        springs.at_start + energy.allowed();
   end.sound = !start_is_feasible || falls_below_start;
   return end;
 }
@@ -287,7 +290,6 @@ struct PartEnd {
 /// Solves a part of a step, of which w.now becomes the end, at `share` of the whole.
 __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const StepMotion& motion, double share,
                                            ReplayStats& stats) {
-  constexpr double rounding_tolerance = 1e-6;
   predict(w, step, motion, share);
   project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
   evaluate(w, step, nullptr, w.now);
@@ -362,7 +364,6 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
 /// has failed the other is not divided any more.
 __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion& motion,
                                     const SheetState& state) {
-  constexpr int most_halvings = 16;
   ReplayStats stats = {};
   begin_holds(w, step, motion, state.positions);
   // Of each part of a part, from the whole step on: halves that it may be divided into still.

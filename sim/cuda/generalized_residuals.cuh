@@ -91,7 +91,8 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
   multiply_search();
   apply_left(v.image);
   for (int i = first; i < size; i += step) v.residual[i] -= v.image[i];
-  const float norm = norm_of(v.residual), target = fmaxf(linear_share * norm, problem.tolerance);
+  const float norm = norm_of(v.residual),
+              target = fmaxf(static_cast<float>(enough) * norm, problem.tolerance);
   double* right = memory.small + most_directions * small_columns + 2 * most_directions;
   if (first == 0) right[0] = norm;
   for (int i = first; i < size; i += step) memory.basis[i] = v.residual[i] / norm;

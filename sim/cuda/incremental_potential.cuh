@@ -377,7 +377,6 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
 /// rounding of positions turns the friction of a vertex that starts to slide, and stretches the springs of
 /// holds: that much more may be missing, of springs the most of them at each vertex.
 __device__ inline bool balanced(const StepProblem& step, const Iterate& at, double tolerance) {
-  constexpr double vertex_tolerance = 30;
   return at.worst <= vertex_tolerance * tolerance &&
          at.residual <= tolerance * step.material->force_scale + at.rounding;
 }

@@ -6,6 +6,8 @@
 #include "sim/cuda/incremental_potential.cuh"
 #include "sim/cuda/membrane_hessian.cuh"
 #include "sim/cuda/team_factor.cuh"
+#include "sim/newton/newton_loop.h"
+#include "sim/newton/step_end.h"
 
 namespace flash::sim::cuda {
 
@@ -124,26 +126,25 @@ struct LinearWork {
 };
 
 __device__ inline LinearWork linear_work(const Work& w, const StepProblem& step) {
-  constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
   const TeamMemory& m = w.memory;
   char* chip = shared_memory<char>();
   const auto on_chip = [&](int at, auto* otherwise) {
     return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
   };
-  return {{m.block_rows, static_cast<float>(step.numbers.effective_rigidity()), hinges_of(w), m.factor,
-           m.gradient, step.restrictions,
-           static_cast<float>(linear_tolerance *
-                              fmin(w.replay.tolerance * step.material->force_scale, w.now.residual))},
-          {m.residual,
-           m.image,
-           m.search,
-           on_chip(w.replay.search_at, m.search),
-           on_chip(w.replay.solved_at, m.solved),
-           w.replay.solved_at >= 0,
-           {chip + w.replay.step_ring_at, w.replay.step_depth},
-           {m.clocks}},
-          reinterpret_cast<float*>(chip),
-          chip + linear_partial_bytes};
+  return {
+      {m.block_rows, static_cast<float>(step.numbers.effective_rigidity()), hinges_of(w), m.factor,
+       m.gradient, step.restrictions,
+       static_cast<float>(linear_target(w.replay.tolerance * step.material->force_scale, w.now.residual))},
+      {m.residual,
+       m.image,
+       m.search,
+       on_chip(w.replay.search_at, m.search),
+       on_chip(w.replay.solved_at, m.solved),
+       w.replay.solved_at >= 0,
+       {chip + w.replay.step_ring_at, w.replay.step_depth},
+       {m.clocks}},
+      reinterpret_cast<float*>(chip),
+      chip + linear_partial_bytes};
 }
 
 /// Solves the linear problem. `enough`: residual that is small enough for one that goes on from the last
@@ -167,7 +168,6 @@ __device__ __noinline__ int find_coupled_direction(const Work& w, const StepProb
 /// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
 /// its contacts in turn. `stuck`: with the positive Hessian, whose direction leads down.
 __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled, ReplayStats& stats) {
-  constexpr int linear_problems = 6;
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
   const bool touches = step.obstacles.count > 0;
@@ -180,23 +180,25 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   synchronize_team();
   count_phase(m, ReplayPhase::rest);
   bool refactor = false;
-  float enough = 0;
-  for (int solved = 1;; ++solved) {
-    restrict_by(w, w.linear, coupled, step);
-    count_phase(m, ReplayPhase::contact);
-    const LinearEnd end =
-        coupled ? LinearEnd{find_coupled_direction(w, step), 0} : find_direction(w, step, enough);
-    count_phase(m, ReplayPhase::directions);
-    stats.solves += end.solves;
-    refactor = refactor || end.solves > w.replay.stale_factor_solves;
-    if (solved == 1) enough = linear_share * end.first_residual;
-    // What holds in the last one has to be what its direction was found with.
-    if (!touches || solved == linear_problems) break;
-    const bool changed =
-        exchange_contacts(tables, step, w.now, m.direction, m.change, stuck, w.linear, m.gradient);
-    count_phase(m, ReplayPhase::contact);
-    if (!changed) break;
-  }
+  float small = 0;
+  solve_and_exchange(
+      [&](int solved) {
+        restrict_by(w, w.linear, coupled, step);
+        count_phase(m, ReplayPhase::contact);
+        const LinearEnd end =
+            coupled ? LinearEnd{find_coupled_direction(w, step), 0} : find_direction(w, step, small);
+        count_phase(m, ReplayPhase::directions);
+        stats.solves += end.solves;
+        refactor = refactor || end.solves > w.replay.stale_factor_solves;
+        if (solved == 0) small = static_cast<float>(enough) * end.first_residual;
+      },
+      [&] {
+        if (!touches) return false;
+        const bool changed =
+            exchange_contacts(tables, step, w.now, m.direction, m.change, stuck, w.linear, m.gradient);
+        count_phase(m, ReplayPhase::contact);
+        return changed;
+      });
   change_common([&] { w.refactor = refactor; });
 }
 
@@ -239,52 +241,33 @@ __device__ inline void swap_iterates(Iterate& a, Iterate& b) {
   });
 }
 
-/// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
-/// Near the solution it falls by less than its rounding. So a smaller residual does as well.
-__device__ inline bool acceptable(const Work& w, bool coupled, double slope, double length) {
-  constexpr double armijo_share = 1e-4, residual_share = 0.1;
-  return (!coupled &&
-          potential_on_line(w.trial) <= w.now.potential + w.now.friction + armijo_share * length * slope) ||
-         w.trial.residual <= (1 - residual_share * length) * w.now.residual;
-}
+/// The way along the direction from w.now (sim/newton/line_search.h).
+struct DirectionLine {
+  Work& w;
+  const StepProblem& step;
 
-/// Halves a whole step until it is acceptable or too short; returns its length.
-__device__ inline double line_search(Work& w, const StepProblem& step, bool coupled, double slope) {
-  constexpr double least_length = 1e-3;
-  double length = 1;
-  move(w, step, length, w.trial);
-  while (!acceptable(w, coupled, slope, length) && length > least_length) {
-    length *= 0.5;
-    move(w, step, length, w.trial);
+  __device__ double start_potential() const { return w.now.potential + w.now.friction; }
+  __device__ double start_residual() const { return w.now.residual; }
+  __device__ double trial_potential() const { return potential_on_line(w.trial); }
+  __device__ double trial_residual() const { return w.trial.residual; }
+  __device__ double second_potential() const { return potential_on_line(w.longer); }
+  __device__ double second_residual() const { return w.longer.residual; }
+  __device__ double end_slope() const { return slope_at(w, w.trial); }
+  __device__ double move(double length) const {
+    cuda::move(w, step, length, w.trial);
+    return length;
   }
-  return length;
-}
-
-/// Goes on along the line, by secants, while the potential falls. A sheet about to buckle needs it: the
-/// matrix, made positive, is stiffer than the sheet, and steps are too short.
-__device__ inline void lengthen(Work& w, const StepProblem& step, double slope, double length) {
-  constexpr double greatest_length = 30, flat_slope = 0.2, least_growth = 1.5, greatest_growth = 3,
-                   residual_growth = 10;
-  while (length >= 1 && length < greatest_length) {
-    const double end_slope = slope_at(w, w.trial);
-    if (end_slope > flat_slope * slope) return;
-    const double secant = slope / (slope - end_slope);
-    const double growth = secant < least_growth      ? least_growth
-                          : secant > greatest_growth ? greatest_growth
-                                                     : secant;
-    move(w, step, length * growth, w.longer);
-    if (potential_on_line(w.longer) >= potential_on_line(w.trial) ||
-        !(w.longer.residual < residual_growth * w.now.residual))
-      return;
-    length *= growth;
-    swap_iterates(w.trial, w.longer);
+  __device__ double move_second(double length) const {
+    cuda::move(w, step, length, w.longer);
+    return length;
   }
-}
+  __device__ void take_second() const { swap_iterates(w.trial, w.longer); }
+};
 
-/// From w.now to balance or until it cannot go on. Counts its work in `stats`.
-__device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stats) {
-  constexpr int most_forced_moves = 6, coupled_after = 20;
-  constexpr double start_tolerance_share = 1e-3;  // as on the CPU
+/// From w.now to balance or until it cannot go on, as iterate (sim/newton/newton_loop.h). Counts its work in
+/// `stats`.
+__device__ inline void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stats) {
+  const DirectionLine line{w, step};
   bool stuck = false;
   int forced_moves = 0;
   double tolerance = start_tolerance_share * w.replay.tolerance;
@@ -297,15 +280,13 @@ __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stat
       ++stats.factorizations;
     }
     assemble_matrix(w, step, stuck);
-    // In the parts of a step that could not be solved as one, friction at the normal forces of the iterate
-    // goes round in circles at times. Then both are solved at once, guided by the residual.
     const bool coupled =
-        !stuck && step.obstacles.count > 0 && step.h < w.replay.time_step && iterations + 1 > coupled_after;
+        !stuck && step.obstacles.count > 0 && couples_friction(step.h, w.replay.time_step, iterations + 1);
     linear_step(w, step, stuck, coupled, stats);
 
     const double slope = slope_at(w, w.now);
-    const double length = line_search(w, step, coupled, slope);
-    if (!acceptable(w, coupled, slope, length)) {
+    const double length = shorten(line, coupled, slope);
+    if (!acceptable(line, coupled, slope, length)) {
       if (balanced(step, w.now, tolerance)) return;
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
@@ -317,7 +298,7 @@ __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stat
       if (++forced_moves > most_forced_moves || !isfinite(w.trial.potential)) return;
     }
     stuck = false;
-    if (!coupled) lengthen(w, step, slope, length);
+    if (!coupled) lengthen(line, slope, length);
     swap_iterates(w.now, w.trial);
   }
 }

@@ -8,12 +8,11 @@
 
 #include "sim/cuda/layout/front_layout.h"
 #include "sim/cuda/most_obstacles.h"
+#include "sim/newton/step_numbers.h"
 
 namespace flash::sim::cuda {
 
 namespace {
-
-constexpr int most_halvings = 16;
 
 /// That each spring has a vertex, a hold and a stiffness.
 void check_springs(const ReplayEnvironment& environment, const ReplaySettings& settings, int vertices) {

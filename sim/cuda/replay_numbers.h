@@ -7,6 +7,7 @@
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/cuda/vertex_records.h"
+#include "sim/newton/step_numbers.h"
 
 struct __half;  // of CUDA
 
@@ -78,9 +79,6 @@ struct ReplayStats {
   /// What it took, in solves, about: by the parts of steps of 1,024 vertices on one processor.
   FLASH_HOST_DEVICE int work() const { return solves + 2 * iterations + 8 * factorizations; }
 };
-
-/// Directions that the generalized minimal residual method keeps, all of them.
-inline constexpr int most_directions = 40;
 
 /// Memory of a team for that method.
 struct CoupledMemory {

@@ -1,6 +1,7 @@
 #include "sim/cuda/replay_records.h"
 
 #include "sim/law/membrane.h"
+#include "sim/newton/step_numbers.h"
 #include "sim/step/moving_obstacles.h"
 
 namespace flash::sim::cuda {
@@ -11,7 +12,8 @@ ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& envir
   const data::SheetMaterial& m = environment.material;
   const SheetLame lame = sheet_lame(m.membrane_stiffness, m.poissons_ratio);
   const Membrane membrane = membrane_of(m.constitutive, lame);
-  const double gravity = environment.gravity.norm(), weight_factor = gravity > 0 ? gravity : 9.81;
+  const double gravity = environment.gravity.norm(),
+               weight_factor = gravity > 0 ? gravity : weight_of_nothing;
   return {.law = membrane.law,
           .lame = membrane.lame,
           .damping = {lame.mu, m.constitutive == data::Constitutive::tri_arap ? 0 : lame.lambda},

@@ -9,8 +9,6 @@
 namespace flash::sim {
 namespace {
 
-constexpr int most_directions = 40;  ///< of GMRES, which keeps all of them
-
 void precondition(BlockCholesky<float>& factor, const OrderedVector<float>& residual, OrderedVector<float>&,
                   OrderedVector<float>& result) {
   result = residual;

@@ -4,6 +4,7 @@
 
 #include "sim/cpu/block_cholesky.h"
 #include "sim/cpu/sheet_product.h"
+#include "sim/newton/step_numbers.h"
 
 namespace flash::sim {
 
@@ -31,7 +32,7 @@ struct RestrictedProblem {
   OrderedVector<Scalar> right;             ///< b
   OrderedVector<Scalar> start;             ///< x to begin with; what is not free stays
   double tolerance;                        ///< residual that is small enough; so is `enough` of the first
-  int most_solves = 20;                    ///< iterations of conjugate gradients
+  int most_solves = sim::most_solves;      ///< iterations of conjugate gradients
 };
 
 /// x <- M x, by the matrices of some vertices.
@@ -43,9 +44,6 @@ void apply(const std::vector<VertexMatrix<Scalar>>& matrices, OrderedVector<Scal
               .eval();
   }
 }
-
-/// Share of the first residual that conjugate gradients solve to: a direction needs a digit or two.
-inline constexpr double enough = 0.1;
 
 template <typename Scalar>
 struct KrylovSolution {

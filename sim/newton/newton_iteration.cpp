@@ -4,40 +4,18 @@
 #include <cmath>
 
 #include "sim/newton/active_set.h"
+#include "sim/newton/newton_loop.h"
+#include "sim/newton/step_end.h"
 #include "sim/step/feasible_positions.h"
 #include "sim/step/moving_obstacles.h"
 
 namespace flash::sim {
 namespace {
 
-constexpr int coupled_after = 20;  ///< iterations of a part after which friction follows the normal forces
 constexpr int layers_coupled_after = 3;  ///< iterations after which friction of layers may do so
-constexpr int linear_problems = 6;  ///< an iteration, each with the contacts that the one before asks for
-constexpr double linear_tolerance = 0.3;  ///< of a linear problem, as a share of the step's
-/// Of the tolerance, for the place where a step starts to be taken for its end as it is. With the whole
-/// tolerance forces below it would move nothing, however long they act.
-constexpr double start_tolerance_share = 1e-3;
-constexpr double armijo_share = 1e-4;   ///< of the decrease of the potential that the slope promises
-constexpr double residual_share = 0.1;  ///< of the decrease of the residual that a full step promises
-constexpr double least_length = 1e-3;   ///< down to which a step is halved
-constexpr int most_forced_moves = 6;    ///< a step: moves that neither criterion accepts
-constexpr double greatest_length = 30;  ///< up to which a step is lengthened
-constexpr double flat_slope = 0.2;      ///< share of the first slope from which on a line is flat
-constexpr double least_growth = 1.5, greatest_growth = 3.0;  ///< of a length at a time
-constexpr double residual_growth = 10;  ///< of the residual by a lengthened step, at most
 
 /// Whether layers rub on each other.
 bool layers_rub(const StepProblem& problem) { return problem.layers && problem.layers->friction() > 0; }
-
-/// Friction at the normal forces of the iterate converges where these change little. In the parts of a step
-/// that could not be solved as one it goes round in circles at times. Then both are solved at once, guided by
-/// the residual. Normal forces of layers change with every motion, so they are coupled in any step. But far
-/// from its end the potential is the better guide: only where the last iteration went its whole way.
-bool couples_friction(const StepProblem& problem, const SolverSettings& settings, int iterations,
-                      bool went_whole) {
-  if (layers_rub(problem)) return iterations > layers_coupled_after && went_whole;
-  return problem.contacts.time_step < settings.time_step && iterations > coupled_after;
-}
 
 /// The stiffness of all touches of layers at an iterate; `coupled`: with friction that grows with the normal
 /// forces.
@@ -104,38 +82,25 @@ void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWor
   assemble_matrix(problem, stuck, coupled, w);
   const Linearization iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
   const double lightest = *std::min_element(problem.force_scales.begin(), problem.force_scales.end());
-  const double small = linear_tolerance * std::min(w.settings.tolerance * lightest, w.now.residual.norm());
+  const double small = linear_target(w.settings.tolerance * lightest, w.now.residual.norm());
   w.linear = w.now.contacts;
   w.gradient = w.now.residual;
   w.refactor = false;
-  for (int solved = 0; solved < linear_problems; ++solved) {
-    w.force = w.now.force;
-    const int solves = coupled
-                           ? w.matrix.solve_coupled(w.linear, friction_couplings(problem.contacts, w.linear),
-                                                    w.gradient, small, w.direction, w.force)
-                           : w.matrix.solve(w.linear, w.gradient, small, solved > 0, w.direction, w.force);
-    report.solves += solves;
-    w.refactor = w.refactor || solves > w.settings.stale_factor_solves;
-    // What holds in the last one has to be what its direction was found with.
-    if (solved + 1 == linear_problems) return;
-    const bool changed = stuck ? hold_touching(iterate, w.direction, w.linear)
-                               : exchange_contacts(iterate, w.direction, w.force, w.gradient, w.linear);
-    if (!changed) return;
-  }
+  solve_and_exchange(
+      [&](int solved) {
+        w.force = w.now.force;
+        const int solves =
+            coupled ? w.matrix.solve_coupled(w.linear, friction_couplings(problem.contacts, w.linear),
+                                             w.gradient, small, w.direction, w.force)
+                    : w.matrix.solve(w.linear, w.gradient, small, solved > 0, w.direction, w.force);
+        report.solves += solves;
+        w.refactor = w.refactor || solves > w.settings.stale_factor_solves;
+      },
+      [&] {
+        return stuck ? hold_touching(iterate, w.direction, w.linear)
+                     : exchange_contacts(iterate, w.direction, w.force, w.gradient, w.linear);
+      });
 }
-
-/// The way along w.direction from w.now.
-struct SearchLine {
-  const StepProblem& problem;
-  const NewtonWorkspace& w;
-  bool coupled;
-  double potential, slope;  ///< of the step with friction, at its start [J]
-};
-
-/// A point on a search line, `length` directions from its start.
-struct LinePoint {
-  double length, potential;
-};
 
 /// The potential with that of friction at the normal forces of the line's start.
 double potential_at(const StepProblem& problem, const Iterate& now, const Iterate& at) {
@@ -145,98 +110,94 @@ double potential_at(const StepProblem& problem, const Iterate& now, const Iterat
                         : potential;
 }
 
-/// Evaluates the feasible iterate nearest to the point at `length`, or nearer where the surface would pass
-/// through itself on the way.
-LinePoint move(const SearchLine& line, double length, Iterate& to) {
+/// A point on a search line.
+struct PointOnLine {
+  double length, potential, residual;
+};
+
+/// Evaluates the feasible iterate nearest to the point `length` directions from w.now, or nearer where the
+/// surface would pass through itself on the way.
+PointOnLine move(const StepProblem& problem, const NewtonWorkspace& w, double length, Iterate& to) {
   constexpr int most_cuts = 20;
   for (int cut = 0;; ++cut) {
-    to.positions = line.w.now.positions + length * line.w.direction;
-    project_to_feasible(line.problem.contacts, line.w.linear, to.positions);
-    const double share =
-        line.problem.layers ? line.problem.layers->free_share(line.w.now.positions, to.positions) : 1;
+    to.positions = w.now.positions + length * w.direction;
+    project_to_feasible(problem.contacts, w.linear, to.positions);
+    const double share = problem.layers ? problem.layers->free_share(w.now.positions, to.positions) : 1;
     if (share == 1) break;
     length *= share;
     if (cut < most_cuts) continue;
-    to.positions = line.w.now.positions;
+    to.positions = w.now.positions;
     break;
   }
-  line.problem.evaluate(to);
-  return {length, potential_at(line.problem, line.w.now, to)};
+  problem.evaluate(to);
+  return {length, potential_at(problem, w.now, to), to.residual.norm()};
 }
 
-/// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
-/// Near the solution it falls by less than its rounding. So a smaller residual does as well.
-bool acceptable(const SearchLine& line, const LinePoint& point, const Iterate& trial) {
-  return (!line.coupled && point.potential <= line.potential + armijo_share * point.length * line.slope) ||
-         trial.residual.norm() <= (1 - residual_share * point.length) * line.w.now.residual.norm();
-}
+/// What iterate (newton_loop.h) asks of the processor.
+struct NewtonStep {
+  const StepProblem& problem;
+  NewtonWorkspace& w;
+  StepReport& report;
+  int most;  ///< iterations
+  PointOnLine start{}, trial{}, second{};
 
-/// Halves a whole step until it is acceptable or too short.
-LinePoint line_search(const SearchLine& line, Iterate& trial) {
-  LinePoint point = move(line, 1.0, trial);
-  while (!acceptable(line, point, trial) && point.length > least_length)
-    point = move(line, 0.5 * point.length, trial);
-  return point;
-}
-
-/// Goes on along the line, by secants, while the potential falls. A sheet about to buckle needs it: the
-/// matrix, made positive, is stiffer than the sheet, and steps are too short. Returns where it ends.
-LinePoint lengthen(const SearchLine& line, LinePoint point, Iterate& trial, Iterate& longer) {
-  while (point.length >= 1 && point.length < greatest_length) {
-    const double end_slope = trial.residual.cwiseProduct(line.w.direction).sum();
-    if (end_slope > flat_slope * line.slope) break;
-    const double growth = std::clamp(line.slope / (line.slope - end_slope), least_growth, greatest_growth);
-    const LinePoint further = move(line, point.length * growth, longer);
-    if (further.potential >= point.potential ||
-        !(longer.residual.norm() < residual_growth * line.w.now.residual.norm()))
-      break;
-    point = further;
-    std::swap(trial, longer);
+  int most_iterations() const { return most; }
+  bool balanced(double share) const { return problem.balanced(w.now, share * w.settings.tolerance); }
+  bool begin_iteration() {
+    ++report.iterations;
+    // A spring may be a thousand times as stiff as what the factor has in its place.
+    if (!w.refactor && w.factored_springs == problem.potential.spring_stiffness()) return true;
+    if (!factorize(problem, w)) return false;
+    ++report.factorizations;
+    return true;
   }
-  return point;
-}
+  /// Normal forces of layers change with every motion, so they are coupled in any step. But far from its end
+  /// the potential is the better guide: only where the last iteration went its whole way.
+  bool couples(int iterations, bool whole) const {
+    if (layers_rub(problem)) return iterations > layers_coupled_after && whole;
+    return couples_friction(problem.contacts.time_step, w.settings.time_step, iterations);
+  }
+  void find_direction(bool stuck, bool coupled) {
+    linear_step(problem, stuck, coupled, w, report);
+    start = {0, potential_at(problem, w.now, w.now), w.now.residual.norm()};
+  }
+  double slope() const { return w.now.residual.cwiseProduct(w.direction).sum(); }
+  bool repeats(bool coupled) const { return coupled && layers_rub(problem); }
+  void renew() { w.refactor = true; }
+  void go_to_trial(double length) {
+    if (problem.layers) problem.layers->carry_duals(w.now.layers, length, w.trial.layers);
+    std::swap(w.now, w.trial);
+  }
+
+  double start_potential() const { return start.potential; }
+  double start_residual() const { return start.residual; }
+  double trial_potential() const { return trial.potential; }
+  double trial_residual() const { return trial.residual; }
+  bool trial_is_finite() const { return std::isfinite(trial.potential); }
+  double second_potential() const { return second.potential; }
+  double second_residual() const { return second.residual; }
+  double end_slope() const { return w.trial.residual.cwiseProduct(w.direction).sum(); }
+  double move(double length) {
+    trial = sim::move(problem, w, length, w.trial);
+    return trial.length;
+  }
+  double move_second(double length) {
+    second = sim::move(problem, w, length, w.longer);
+    return second.length;
+  }
+  void take_second() {
+    std::swap(w.trial, w.longer);
+    std::swap(trial, second);
+  }
+};
 
 }  // namespace
 
 void iterate_to_balance(const StepProblem& problem, int most_iterations, NewtonWorkspace& w,
                         StepReport& report) {
-  const int first = report.iterations;
   w.longer.contacts = w.trial.contacts = w.now.contacts;
-  bool stuck = false, went_whole = true;
-  int forced_moves = 0;
-  double tolerance = start_tolerance_share * w.settings.tolerance;
-  while (report.iterations - first < most_iterations && !problem.balanced(w.now, tolerance)) {
-    tolerance = w.settings.tolerance;
-    ++report.iterations;
-    // A spring may be a thousand times as stiff as what the factor has in its place.
-    if (w.refactor || w.factored_springs != problem.potential.spring_stiffness()) {
-      if (!factorize(problem, w)) return;
-      ++report.factorizations;
-    }
-    const bool coupled =
-        !stuck && couples_friction(problem, w.settings, report.iterations - first, went_whole);
-    linear_step(problem, stuck, coupled, w, report);
-
-    const SearchLine line{problem, w, coupled, potential_at(problem, w.now, w.now),
-                          w.now.residual.cwiseProduct(w.direction).sum()};
-    LinePoint point = line_search(line, w.trial);
-    went_whole = point.length == 1;
-    if (!acceptable(line, point, w.trial)) {
-      if (problem.balanced(w.now, tolerance)) return;
-      if (coupled && layers_rub(problem)) continue;
-      if (!stuck) {
-        // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
-        stuck = w.refactor = true;
-        continue;
-      }
-      // A small step all the same lets the contacts decide anew.
-      if (++forced_moves > most_forced_moves || !std::isfinite(point.potential)) return;
-    }
-    stuck = false;
-    if (!coupled) point = lengthen(line, point, w.trial, w.longer);
-    if (problem.layers) problem.layers->carry_duals(w.now.layers, point.length, w.trial.layers);
-    std::swap(w.now, w.trial);
-  }
+  NewtonStep step{problem, w, report, most_iterations};
+  iterate(step);
 }
 
 bool carry_on(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {

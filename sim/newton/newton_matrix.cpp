@@ -12,7 +12,7 @@ using data::Points;
 namespace {
 
 constexpr double sheet_neighbours = 6, solid_neighbours = 14;  ///< of a vertex, in a regular linear mesh
-constexpr int most_solves = 20, most_layered_solves = 100;     ///< of a linear problem
+constexpr int most_layered_solves = 100;                       ///< of a linear problem where layers touch
 constexpr double little = 0.01;  ///< share of the least eigenvalue that rounding may change
 
 /// The matrices on the vertices of the constraints: what each leaves free, and its coupling where there is

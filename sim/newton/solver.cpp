@@ -10,6 +10,7 @@
 #include "data/files/text.h"
 #include "sim/law/feasible_place.h"
 #include "sim/newton/newton_iteration.h"
+#include "sim/newton/step_end.h"
 #include "sim/pairs/candidate_pairs.h"
 #include "sim/pairs/intersection.h"
 #include "sim/step/exits.h"
@@ -22,10 +23,8 @@ using data::Points;
 
 namespace {
 
-constexpr double rounding_tolerance = 1e-6;  ///< relative residual below which a shorter step is no help
-constexpr double gap_tolerance = 1e-9;       ///< on gaps and complementarity [m]
-constexpr int most_portions = 20;            ///< in which holds arrive where layers are in their way
-constexpr int portion_iterations = 5;        ///< by which the surface makes way after each of them
+constexpr int most_portions = 20;      ///< in which holds arrive where layers are in their way
+constexpr int portion_iterations = 5;  ///< by which the surface makes way after each of them
 
 /// Elastic energy at the start of the step; as a rule the last step computed it.
 ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWorkspace& w) {
@@ -113,7 +112,7 @@ bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& repo
   report.residual = problem.relative_residual(w.now);
   report_contacts(problem, w.now, report);
   const bool energy_is_sound = account_for_energy(problem, elastic_at_start, w.now, report);
-  const bool sound = free && report.complementarity <= gap_tolerance && energy_is_sound;
+  const bool sound = free && is_complementary(report.complementarity) && energy_is_sound;
   report.converged = sound && problem.balanced(w.now, w.settings.tolerance);
   return sound && problem.balanced(w.now, std::max(w.settings.tolerance, rounding_tolerance));
 }

@@ -6,6 +6,7 @@
 
 #include "data/numbers/worst.h"
 #include "sim/law/least_weight.h"
+#include "sim/newton/step_numbers.h"
 
 namespace flash::sim {
 
@@ -26,7 +27,7 @@ StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, 
     : laws(body_laws(plan, environment)),
       potential(plan, laws, environment, time_step),
       contacts(plan.sheet, environment, time_step, way_out),
-      gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81) {
+      gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : weight_of_nothing) {
   for (const BodyLaw& law : laws)
     force_scales.push_back(rows_of(law.place.body, potential.mass()).norm() * gravity);
   if (memory == nullptr) return;
@@ -59,7 +60,6 @@ void StepProblem::evaluate(Iterate& iterate) const {
 }
 
 bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
-  constexpr double vertex_tolerance = 30;  ///< tolerance of a vertex as a multiple of the body's
   for (std::size_t b = 0; b < laws.size(); ++b) {
     const Body& body = laws[b].place.body;
     const double least_mass =

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "data/numbers/worst.h"
+#include "sim/newton/step_end.h"
 #include "sim/newton/step_problem.h"
 
 namespace flash::sim {
@@ -11,12 +12,6 @@ namespace flash::sim {
 using data::Points;
 using data::worst;
 using Eigen::Vector3d;
-
-namespace {
-
-constexpr double energy_tolerance = 1e-2;  ///< gain of energy, as a share of the energy that can be converted
-
-}  // namespace
 
 void report_contacts(const StepProblem& problem, const Iterate& end, StepReport& report) {
   const Environment& environment = problem.contacts.environment;
@@ -112,23 +107,20 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
 
   const double stored_at_start = elastic_at_start.total(), stored_at_end = end.elastic.total();
   const double kinetic_at_start = kinetic_of(start.velocities);
-  const double gain =
-      report.kinetic - kinetic_at_start + stored_at_end - stored_at_start - falls - report.work;
-  const double there = kinetic_at_start + stored_at_start + std::max(0.0, falls) + std::max(0.0, report.work);
-  // The allowance covers the rounding of positions and of bending, at the start and at the end, and the work
-  // of the weight over a nanometre.
-  double rounding = 1e-9 * mass.sum() * problem.gravity;
+  double rounding = rounding_of_weight(mass.sum(), problem.gravity);
   for (const BodyLaw& law : problem.laws) {
     const double body_mass = rows_of(law.place.body, mass).sum();
     if (law.solid == nullptr) rounding += 2 * law.material.bending_rigidity * law.bending.flat_energy;
-    rounding += law.solid != nullptr
-                    ? 1e-14 * law.solid->youngs_modulus * body_mass / law.solid->density
-                    : 1e-14 * law.material.largest_stiffness() * body_mass / law.material.areal_density;
+    rounding +=
+        law.solid != nullptr
+            ? rounding_of_membrane(body_mass, law.solid->youngs_modulus, law.solid->density)
+            : rounding_of_membrane(body_mass, law.material.largest_stiffness(), law.material.areal_density);
   }
-  const double allowed = energy_tolerance * there + unbalanced + bristles + rounding;
-  if (!(gain <= allowed)) return false;
+  const EnergyAccount energy = {kinetic_at_start, report.kinetic, stored_at_start, stored_at_end, falls,
+                                report.work,      unbalanced,     bristles,        rounding};
+  if (!energy.balances()) return false;
   if (!start_is_feasible) return true;
-  return end.incremental_potential <= problem.potential.at_start(elastic_at_start) + allowed;
+  return end.incremental_potential <= problem.potential.at_start(elastic_at_start) + energy.allowed();
 }
 
 void add_work(const StepReport& given_up, StepReport& report) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -133,6 +134,40 @@ TEST(Krylov, ConjugateGradientsStopWhereTheMatrixCurvesDown) {
   const KrylovSolution<double> solution = conjugate_gradients(problem, *example.plan->kernels);
   EXPECT_EQ(solution.solves, 1);
   EXPECT_GT(example.numbered(solution.x).dot(right), 0);  // still a way down
+}
+
+/// A problem whose eigenvalues stand over eight decades, those of its preconditioner in one place. What a
+/// polynomial of the matrix that is one at zero leaves of the vectors of its small eigenvalues is most of
+/// them: more than half.
+template <typename Solve>
+int solves_of_a_hard_problem(const Solve& solve) {
+  Example<double> example;
+  for (std::size_t k = 0; k < example.values.size(); ++k) example.values[k] = 0;
+  for (int i = 0; i < example.plan->pattern.size; ++i)
+    for (int c = 0; c < 3; ++c)
+      example.values[9L * i + 4 * c] = std::pow(10.0, 8.0 * (3 * i + c) / static_cast<double>(example.size));
+  example.product.assign(example.plan->full_product, example.values, {});
+  const VectorXd right = VectorXd::Ones(example.size);
+  return solve(RestrictedProblem<double>{example.product,
+                                         example.preconditioner,
+                                         {},
+                                         example.ordered(right),
+                                         OrderedVector<double>::Zero(4 * example.size / 3),
+                                         0},
+               *example.plan->kernels)
+      .solves;
+}
+
+TEST(Krylov, ConjugateGradientsTakeTwentySolvesAtMost) {
+  EXPECT_EQ(solves_of_a_hard_problem([](const auto& problem, const Kernels& kernels) {
+              return conjugate_gradients(problem, kernels);
+            }),
+            20);
+}
+
+TEST(Krylov, TheGeneralizedMinimalResidualKeepsFortyDirectionsAtMost) {
+  EXPECT_EQ(solves_of_a_hard_problem([](const auto& problem, const Kernels&) { return gmres(problem, {}); }),
+            40);
 }
 
 }  // namespace
