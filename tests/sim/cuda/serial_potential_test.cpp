@@ -5,11 +5,9 @@
 
 #include <limits>
 
-#include "sim/cuda/hold_motion.h"
 #include "sim/newton/active_set.h"
 #include "sim/newton/step_problem.h"
-#include "tests/sim/cuda/serial_replay.h"
-#include "tests/sim/properties/drawn_world.h"
+#include "tests/sim/cuda/drawn_step.h"
 
 namespace flash::sim::cuda {
 namespace {
@@ -21,37 +19,6 @@ using Eigen::Vector3d;
 constexpr double epsilon = std::numeric_limits<double>::epsilon(),
                  single_epsilon = std::numeric_limits<float>::epsilon();
 
-/// A world before a step of `h`, and a place near the end of that step.
-struct Drawn {
-  std::shared_ptr<const SheetPlan> plan = make_sheet_plan(draw_sheet());
-  Environment environment;
-  double h = draw_log(2e-3, 2e-2);
-  Points positions;
-
-  explicit Drawn(Environment (*draw_environment)(const Sheet&)) : environment(draw_environment(plan->sheet)) {
-    for (Hold& hold : environment.holds)
-      if (hold.axes == std::array{true, true, true} && draw_chance(0.5)) {
-        hold.stiffness.resize(std::ssize(hold.vertices));
-        for (double& own : hold.stiffness)
-          own = draw_chance(0.2) ? std::numeric_limits<double>::infinity() : draw_log(1e-2, 1e3);
-      }
-    positions = environment.state.positions + h * environment.state.velocities;
-    positions += draw_noise(positions.rows(), draw(0, 0.05) * cell());
-  }
-
-  double cell() const { return std::sqrt(plan->sheet.vertex_area.mean()); }
-
-  SerialReplay serial() const {
-    ReplaySettings settings;
-    settings.time_step = h;
-    settings.steps = 1;
-    Environment moved = environment;
-    const auto springs = motion_of_springs(moved, h, 1);
-    const auto holds = std::make_shared<const HoldMotion>(motion_of_holds(moved, h, 1));
-    return {plan, replay_environment(environment, holds, springs), settings, draw_chance(0.5)};
-  }
-};
-
 /// The same by the processor.
 struct Processor {
   std::shared_ptr<const SheetPlan> plan;
@@ -59,7 +26,7 @@ struct Processor {
   StepProblem problem;
   Iterate at;
 
-  explicit Processor(const Drawn& drawn)
+  explicit Processor(const DrawnStep& drawn)
       : plan(drawn.plan), environment(begun(drawn)), problem(*plan, environment, drawn.h, {.speed = 1}) {
     at.positions = drawn.positions;
     Points carried = at.positions;
@@ -101,7 +68,7 @@ struct Processor {
   }
 
  private:
-  static Environment begun(const Drawn& drawn) {
+  static Environment begun(const DrawnStep& drawn) {
     Environment environment = drawn.environment;
     update_holds(environment, environment.state.time + drawn.h);
     return environment;
@@ -110,7 +77,7 @@ struct Processor {
 
 // Forces are positions, rounded, times stiffness, added up over some tens of neighbours.
 RC_GTEST_PROP(SerialPotential, ForcesAndEnergiesAreThoseOfTheProcessor, ()) {
-  const Drawn drawn(draw_world);
+  const DrawnStep drawn(draw_world);
   SerialReplay serial = drawn.serial();
   const Processor processor(drawn);
   const SerialIterate own = serial.evaluate(drawn.positions);
@@ -132,7 +99,7 @@ RC_GTEST_PROP(SerialPotential, ForcesAndEnergiesAreThoseOfTheProcessor, ()) {
 
 // Central differences over t and 2t part by three times what the first are off by.
 RC_GTEST_PROP(SerialPotential, ForcesAreTheSlopeOfThePotential, ()) {
-  const Drawn drawn(draw_world);
+  const DrawnStep drawn(draw_world);
   SerialReplay serial = drawn.serial();
   const SerialIterate at = serial.evaluate(drawn.positions);
   const double t = 1e-4 * drawn.cell();
@@ -148,7 +115,7 @@ RC_GTEST_PROP(SerialPotential, ForcesAreTheSlopeOfThePotential, ()) {
 }
 
 RC_GTEST_PROP(SerialPotential, TheMatrixIsThatOfTheProcessor, ()) {
-  const Drawn drawn(draw_world);
+  const DrawnStep drawn(draw_world);
   SerialReplay serial = drawn.serial();
   const Processor processor(drawn);
   const Points x = draw_noise(drawn.positions.rows(), 1);
@@ -164,7 +131,7 @@ RC_GTEST_PROP(SerialPotential, TheMatrixIsThatOfTheProcessor, ()) {
 
 // Where neither hinges nor the turn of damping are left out, the matrix is the slope of the forces.
 RC_GTEST_PROP(SerialPotential, TheMatrixIsTheSlopeOfTheForces, ()) {
-  Drawn drawn(draw_flight);
+  DrawnStep drawn(draw_flight);
   data::SheetMaterial& material = drawn.environment.materials[0];
   if (material.bending_model == data::BendingModel::hinge) material.bending_model = data::BendingModel::plate;
   material.stiffness_damping = 0;
@@ -187,7 +154,7 @@ RC_GTEST_PROP(SerialPotential, TheMatrixIsTheSlopeOfTheForces, ()) {
 // A factor solves a system near the given one, as near as its blocks are rounded: its residual is small,
 // whatever the condition is.
 RC_GTEST_PROP(SerialPotential, TheFactorIsThatOfTheRestrictedMatrix, ()) {
-  const Drawn drawn(draw_world);
+  const DrawnStep drawn(draw_world);
   SerialReplay serial = drawn.serial();
   const Processor processor(drawn);
   BlockValues<double> values = processor.blocks(true);

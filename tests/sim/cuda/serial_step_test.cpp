@@ -1,9 +1,12 @@
 // Steps of a device's own text, taken by one thread of the processor, beside the processor's Solver.
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/sim/cuda/contact_scenes.h"
+#include "tests/sim/cuda/drawn_step.h"
 #include "tests/sim/cuda/lifted_scenes.h"
 #include "tests/sim/cuda/serial_replay.h"
 
@@ -79,6 +82,66 @@ TEST(SerialStep, SheetsOnObstaclesMoveAsTheProcessorHasThem) {
   }
   // Which ones a threshold parts at once is chance; most are compared over several steps.
   EXPECT_LE(5 * soon_apart, compared);
+}
+
+/// How far an end of a step is from that which balances exactly, where its surroundings are convex: the
+/// matrix is no less than mass over h^2, so that vertices miss it by no more than |r| h^2 / m [m].
+double way_of_residual(const DrawnStep& drawn, double tolerance) {
+  const Eigen::VectorXd mass = masses_of(drawn.plan->sheet, drawn.environment.materials[0]);
+  const double gravity = drawn.environment.gravity.norm();
+  return tolerance * mass.norm() * (gravity > 0 ? gravity : 9.81) * drawn.h * drawn.h / mass.minCoeff();
+}
+
+/// The end of the step by the processor.
+struct ProcessorStep {
+  Environment environment;
+  StepReport report;
+
+  ProcessorStep(const DrawnStep& drawn, double tolerance, int stale_factor_solves = 4)
+      : environment(drawn.environment) {
+    Solver solver(drawn.plan,
+                  {.time_step = drawn.h, .tolerance = tolerance, .stale_factor_solves = stale_factor_solves});
+    report = solver.step(environment);
+  }
+  const Points& positions() const { return environment.state.positions; }
+};
+
+double distance(const Points& a, const Points& b) { return (a - b).rowwise().norm().maxCoeff(); }
+
+// Contact, friction, rigid and soft holds, loads, all materials. Where surroundings are not convex a step may
+// have several ends, and which of them is found is chance, on the processor
+// too: of ten worlds one at most.
+TEST(SerialStep, AStepOfADrawnWorldEndsWhereTheProcessorHasIt) {
+  constexpr double tolerance = 1e-5;
+  int compared = 0, halved = 0, apart = 0;
+  const bool passed = rc::check([&] {
+    const DrawnStep drawn(draw_world);
+    SerialReplay text = drawn.serial(tolerance);
+    text.advance(1);
+    const ReplayStats& stats = text.stats().front();
+    const ProcessorStep processor(drawn, tolerance);
+    RC_ASSERT(stats.converged == (processor.report.converged ? 1 : 0));
+    if (processor.report.substeps != stats.substeps || stats.substeps > 1) {
+      ++halved;
+      return;
+    }
+    ++compared;
+    const double allowed = 2 * way_of_residual(drawn, tolerance);
+    if (distance(text.positions(), processor.positions()) > allowed) {
+      // Its end is one all the same: it stays where the tolerance falls.
+      SerialReplay closer = drawn.serial(1e-2 * tolerance);
+      closer.advance(1);
+      RC_ASSERT(distance(closer.positions(), text.positions()) <= allowed);
+      ++apart;
+      return;
+    }
+    RC_ASSERT(distance(text.velocities(), processor.environment.state.velocities) <= allowed / drawn.h);
+    RC_ASSERT(std::abs(stats.penetration - processor.report.penetration_max) <= allowed + 2e-9);
+    RC_ASSERT(std::abs(stats.kinetic - processor.report.kinetic) <= 1e-3 * processor.report.kinetic + 1e-12);
+  });
+  EXPECT_TRUE(passed);
+  EXPECT_LE(10 * apart, compared);
+  EXPECT_LE(5 * halved, compared);
 }
 
 // What has room on chip is computed alike in memory.
