@@ -123,7 +123,7 @@ __device__ __noinline__ void gather_contacts(const SheetTables& tables, const St
           for (int r = 0; r < 3; ++r) restriction.free[3 * c + r] = static_cast<float>(contact.free.at(r, c));
           restriction.correction[c] = static_cast<float>(contact.correction[c]);
         }
-        const int at = atomicAdd(count, 1);
+        const int at = take_numbers(*count, 1);
         list[at] = restriction;
         of_place[i] = at;
         if (left == nullptr) return;

@@ -6,6 +6,9 @@ namespace flash::sim::cuda {
 // The team of a device (team.cuh): the threads of a block, or of a cluster of blocks, each on a processor of
 // its own.
 
+/// Four numbers that are read at once.
+using Float4 = float4;
+
 /// On-chip memory of the block, as many bytes as the launch asked for.
 template <typename Number>
 __device__ Number* shared_memory() {
@@ -121,6 +124,9 @@ __device__ void put(Number* to, const Number& value) {
   else
     *to = value;
 }
+
+/// Takes numbers that no other thread gets, from what `counter` was on.
+__device__ inline int take_numbers(int& counter, int count) { return atomicAdd(&counter, count); }
 
 /// Whether any thread of the team has found what it looked for, to all. A barrier.
 __device__ inline bool any_of_team(bool found) {

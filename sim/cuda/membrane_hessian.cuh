@@ -34,7 +34,7 @@ __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers
                              const StepStart& start, const Point* positions, bool positive, float* shares,
                              float* chip) {
   constexpr int block_numbers = share_step<on_chip>, fours = 3 * share_step<false> / 4;
-  float4* own_chip = reinterpret_cast<float4*>(chip) + warp_lanes * fours * warp();
+  Float4* own_chip = reinterpret_cast<Float4*>(chip) + warp_lanes * fours * warp();
   for (int first = warp_lanes * team_warp(); first < tables.triangle_count; first += team_size()) {
     const int t = min(first + lane(), tables.triangle_count - 1);
     const TriangleFrame f = triangle_frame(tables, t, [&](int vertex) { return triple(positions[vertex]); });
@@ -84,7 +84,7 @@ __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers
     if constexpr (on_chip) continue;
     synchronize_warp();
     const int count = fours * min(warp_lanes, tables.triangle_count - first);
-    float4* to = reinterpret_cast<float4*>(shares) + fours * first;
+    Float4* to = reinterpret_cast<Float4*>(shares) + fours * first;
     for (int i = lane(); i < count; i += warp_lanes) to[i] = own_chip[i];
     synchronize_warp();
   }
@@ -111,9 +111,9 @@ __device__ Block sum_of_shares(const EdgeSources& sources, const float* shares) 
         block.numbers[e] = source >= 0 ? shares[share_step<true> * source + e] : 0.0f;
       return block;
     } else {
-      float4 fours[3] = {};
+      Float4 fours[3] = {};
       if (source >= 0) {
-        const float4* from = reinterpret_cast<const float4*>(shares) + share_step<false> / 4 * source;
+        const Float4* from = reinterpret_cast<const Float4*>(shares) + share_step<false> / 4 * source;
 #pragma unroll
         for (int k = 0; k < 3; ++k) fours[k] = from[k];
       }

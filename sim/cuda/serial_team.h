@@ -31,8 +31,8 @@ using std::memcpy;
 using std::min;
 using std::remainder;
 
-/// Of a vector of CUDA.
-struct alignas(16) float4 {
+/// As the vector of CUDA.
+struct alignas(16) Float4 {
   float x, y, z, w;
 };
 
@@ -99,10 +99,9 @@ void put_in_all(Number* on_chip, const Number& value) {
 
 inline bool any_of_team(bool found) { return found; }
 
-inline int atomicAdd(int* to, int number) {
-  const int before = *to;
-  *to += number;
-  return before;
+inline int take_numbers(int& counter, int count) {
+  counter += count;
+  return counter - count;
 }
 
 }  // namespace flash::sim::cuda
