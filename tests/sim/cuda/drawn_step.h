@@ -26,7 +26,8 @@ struct DrawnStep {
           own = draw_chance(0.2) ? std::numeric_limits<double>::infinity() : draw_log(1e-2, 1e3);
       }
     positions = environment.state.positions + h * environment.state.velocities;
-    positions += draw_noise(positions.rows(), draw(0, 0.05) * cell());
+    // Some so crumpled that triangles collapse.
+    positions += draw_noise(positions.rows(), draw(0, draw_chance(0.2) ? 0.8 : 0.05) * cell());
   }
 
   double cell() const { return std::sqrt(plan->sheet.vertex_area.mean()); }

@@ -137,11 +137,65 @@ TEST(SerialStep, AStepOfADrawnWorldEndsWhereTheProcessorHasIt) {
     }
     RC_ASSERT(distance(text.velocities(), processor.environment.state.velocities) <= allowed / drawn.h);
     RC_ASSERT(std::abs(stats.penetration - processor.report.penetration_max) <= allowed + 2e-9);
+    // Each is within the residual of its step.
+    const double weight = 9.81 * masses_of(drawn.plan->sheet, drawn.environment.materials[0]).sum();
+    const auto expect_alike = [&](const std::vector<Eigen::Vector3d>& own,
+                                  const std::vector<Eigen::Vector3d>& other) {
+      RC_ASSERT(own.size() == other.size());
+      for (std::size_t k = 0; k < own.size(); ++k)
+        RC_ASSERT((own[k] - other[k]).norm() <= 100 * tolerance * weight + 1e-2 * other[k].norm());
+    };
+    expect_alike(text.hold_forces(0), processor.report.hold_forces);
+    expect_alike(text.obstacle_forces(0), processor.report.obstacle_forces);
     RC_ASSERT(std::abs(stats.kinetic - processor.report.kinetic) <= 1e-3 * processor.report.kinetic + 1e-12);
   });
   EXPECT_TRUE(passed);
   EXPECT_LE(10 * apart, compared);
   EXPECT_LE(5 * halved, compared);
+}
+
+/// A sheet without weight whose corner a hand turns by half a radian in a step of `h`, which is taken in two
+/// halves as no iteration may solve it. `soft`: by springs.
+struct Turned {
+  static constexpr double h = 0.01;
+  std::shared_ptr<const SheetPlan> plan = make_sheet_plan(small_sheet(4));
+  Environment environment = environment_of(plan->sheet);
+  ReplaySettings settings;
+
+  explicit Turned(bool soft) {
+    environment.gravity.setZero();
+    const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 3).normalized();
+    const Eigen::Isometry3d from = Eigen::Isometry3d(Eigen::Translation3d(0.1, 0, 0.05)),
+                            to = Eigen::Translation3d(0.1, 0.001, 0.05) * Eigen::AngleAxisd(0.5, axis);
+    environment.schedule =
+        std::make_shared<const Schedule>(Schedule{.start = 0, .time_step = h, .frames = {{from, to}}});
+    environment.holds = {{.vertices = {0, 1, 5}, .frame = 0}};
+    if (soft) environment.holds[0].stiffness = Eigen::Vector3d(1, 10, 100);
+    settings.time_step = h;
+    settings.steps = 1;
+    settings.max_iterations = 0;
+    settings.halvings = 1;
+  }
+};
+
+// In the middle of a step holds and springs are where their frame has them, which the processor asks for.
+TEST(SerialStep, WhatHoldsCarryIsOnTheArcOfTheirFrameInTheMiddleOfAStep) {
+  for (const bool soft : {false, true}) {
+    Turned turned(soft);
+    Environment moved = turned.environment;
+    const auto springs = motion_of_springs(moved, Turned::h, 1);
+    const auto holds = std::make_shared<const HoldMotion>(motion_of_holds(moved, Turned::h, 1));
+    SerialReplay text(turned.plan, replay_environment(turned.environment, holds, springs), turned.settings);
+    text.advance(1);
+    Solver solver(turned.plan, {.time_step = Turned::h, .max_iterations = 0, .halvings = 1});
+    const StepReport report = solver.step(turned.environment);
+    ASSERT_EQ(report.substeps, 2);
+    ASSERT_EQ(text.stats().front().substeps, 2);
+    // Places of 0.1 m to their rounding, over half a step.
+    EXPECT_LE(distance(text.positions(), turned.environment.state.positions), 1e-15);
+    EXPECT_LE(distance(text.velocities(), turned.environment.state.velocities), 1e-15 / (0.5 * Turned::h));
+    EXPECT_GT(turned.environment.state.velocities.norm(), 1);
+  }
 }
 
 // What has room on chip is computed alike in memory.
