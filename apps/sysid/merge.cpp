@@ -46,7 +46,8 @@ void expect_one_search(const std::vector<std::string>& runs, const std::string& 
   for (const std::string& run : runs) {
     const std::vector<std::string> of_run = grid_files(run);
     if (of_run.empty() || !fs::is_directory(fs::path(run) / "motions"))
-      throw data::InputError(run + ": found no search with motions, expected a folder that flash-sysid grid --shard wrote");
+      throw data::InputError(
+          run + ": found no search with motions, expected a folder that flash-sysid grid --shard wrote");
     files.insert(files.end(), of_run.begin(), of_run.end());
   }
   for (const std::string& file : grid_files(out)) files.push_back(file);
@@ -78,8 +79,8 @@ int run_merge(const MergeOptions& options) {
     taken += of_run;
   }
   if (options.common.json)
-    std::cout << data::format_json(nlohmann::ordered_json{
-        {"schema", "flash-sysid-merge/1"}, {"motions", folder}, {"taken", taken}});
+    std::cout << data::format_json(
+        nlohmann::ordered_json{{"schema", "flash-sysid-merge/1"}, {"motions", folder}, {"taken", taken}});
   else
     std::printf("%s\n", folder.c_str());
   return exit_done;

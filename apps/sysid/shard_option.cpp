@@ -42,8 +42,9 @@ void add_shard_options(CLI::App& verb, ShardOptions& options) {
   group.add_option("--shard", options.shard,
                    "Take this share of the simulations, as 2/3, of a search that others take part in by the "
                    "same command and folder; slurm: that of the task of a job array");
-  group.add_option("--patience", options.patience,
-                   "Without a motion of the other shares, after which theirs are simulated here [s]")
+  group
+      .add_option("--patience", options.patience,
+                  "Without a motion of the other shares, after which theirs are simulated here [s]")
       ->check(number_from(0))
       ->capture_default_str();
   group.add_flag("--own-share", options.own_share,

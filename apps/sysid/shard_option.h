@@ -17,10 +17,10 @@ void add_shard_options(CLI::App& verb, ShardOptions& options);
 
 /// "2/3", the second of three; "slurm": the task of a job array, by the variables that Slurm sets, read by
 /// `variable` (null where unset). Throws data::InputError that names --shard.
-sysid::Shard parse_shard(const std::string& text,
-                         const std::function<const char*(const char*)>& variable = [](const char* name) {
-                           return std::getenv(name);
-                         });
+sysid::Shard parse_shard(
+    const std::string& text, const std::function<const char*(const char*)>& variable = [](const char* name) {
+      return std::getenv(name);
+    });
 
 /// Its settings, one of one without --shard. Throws data::InputError.
 sysid::Shard shard_of(const ShardOptions& options);

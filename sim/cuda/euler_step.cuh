@@ -119,8 +119,8 @@ __device__ inline void add_hold_forces(const Work& w, const StepProblem& step, c
 }
 
 /// Adds what the obstacles exert in a share of the step.
-__device__ __noinline__ void add_obstacle_forces(const Work& w, const StepProblem& step,
-                                                 const StepMotion& motion, double share) {
+static __device__ __noinline__ void add_obstacle_forces(const Work& w, const StepProblem& step,
+                                                        const StepMotion& motion, double share) {
   const ContactSet& contacts = w.now.contacts;
   for (int k = 0; k < motion.obstacle_count; ++k) {
     double sums[3];
@@ -153,7 +153,8 @@ struct SpringEnd {
   double at_start;  ///< their energy with the vertices where they were at its start [J]
 };
 
-__device__ __noinline__ SpringEnd judge_springs(const Work& w, const StepProblem& step, double* partial) {
+static __device__ __noinline__ SpringEnd judge_springs(const Work& w, const StepProblem& step,
+                                                       double* partial) {
   double sums[2];
   sum_over_team(step.springs.count, sums, partial, [&](int k, double(&own)[2]) {
     const int i = step.springs.list[k].place;
@@ -288,8 +289,8 @@ struct PartEnd {
 };
 
 /// Solves a part of a step, of which w.now becomes the end, at `share` of the whole.
-__device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const StepMotion& motion, double share,
-                                           ReplayStats& stats) {
+static __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const StepMotion& motion,
+                                                  double share, ReplayStats& stats) {
   predict(w, step, motion, share);
   project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
   evaluate(w, step, nullptr, w.now);
@@ -302,8 +303,8 @@ __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const Ste
 
 /// A sheet that starts inside obstacles takes the first exit that does not tear it: each vertex leaves on its
 /// own side, then all by the shortest way, then both slowly; at last it stays. `part`: by the first exit.
-__device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, const StepMotion& motion,
-                                                double share, ReplayStats& stats, PartEnd part) {
+static __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, const StepMotion& motion,
+                                                       double share, ReplayStats& stats, PartEnd part) {
   const SheetTables& tables = w.replay.sheet;
   const double speed = w.replay.exit_speed;
   const Triple direction = shortest_way_out(tables, step, shared_memory<double>());
@@ -324,8 +325,8 @@ __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, cons
 
 /// The part of a step from the share `begin` to `end` of it, as a whole. The state advances where it is
 /// solved or this is the `last_try`. Returns whether it is solved.
-__device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, double begin, double end,
-                         const SheetState& state, ReplayStats& stats, bool last_try) {
+static __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, double begin,
+                                double end, const SheetState& state, ReplayStats& stats, bool last_try) {
   begin_damping(w, step);
   begin_obstacles(w, step, motion, begin, end);
   begin_springs(w, step, motion, begin, end);
@@ -362,8 +363,8 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
 
 /// One time step, in halves where it cannot be solved as a whole, so often as `halvings` says. Once a half
 /// has failed the other is not divided any more.
-__device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion& motion,
-                                    const SheetState& state) {
+static __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion& motion,
+                                           const SheetState& state) {
   ReplayStats stats = {};
   begin_holds(w, step, motion, state.positions);
   // Of each part of a part, from the whole step on: halves that it may be divided into still.

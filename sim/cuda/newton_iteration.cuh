@@ -88,7 +88,7 @@ __device__ void where_shares_are(const Work& w, const Act& act) {
 }
 
 /// Assembles the Hessian at the iterate: exact, or `positive`.
-__device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& step, bool positive) {
+static __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& step, bool positive) {
   where_shares_are(w, [&](auto on_chip) {
     write_parts<on_chip>(w, step, positive);
     assemble_block_rows<on_chip>(w.replay.sheet, step.numbers, matrix_shares<on_chip>(w), w.memory.block_rows,
@@ -99,7 +99,7 @@ __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& s
 }
 
 /// Factorizes the positive Hessian at the iterate. Returns false where it is not positive definite after all.
-__device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
+static __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
   float* chip = shared_memory<float>();
   restrict_by(w, w.now.contacts, false, step);
   where_shares_are(w, [&](auto on_chip) {
@@ -149,7 +149,8 @@ __device__ inline LinearWork linear_work(const Work& w, const StepProblem& step)
 
 /// Solves the linear problem. `enough`: residual that is small enough for one that goes on from the last
 /// direction, 0 for one that does not.
-__device__ __noinline__ LinearEnd find_direction(const Work& w, const StepProblem& step, float enough) {
+static __device__ __noinline__ LinearEnd find_direction(const Work& w, const StepProblem& step,
+                                                        float enough) {
   LinearWork own = linear_work(w, step);
   own.problem.goes_on = enough > 0;
   own.problem.tolerance = fmaxf(own.problem.tolerance, enough);
@@ -158,7 +159,7 @@ __device__ __noinline__ LinearEnd find_direction(const Work& w, const StepProble
 }
 
 /// The same where friction follows the normal forces. Returns the number of solves with the factor.
-__device__ __noinline__ int find_coupled_direction(const Work& w, const StepProblem& step) {
+static __device__ __noinline__ int find_coupled_direction(const Work& w, const StepProblem& step) {
   const LinearWork own = linear_work(w, step);
   return generalized_residuals<half_parts>(w.replay.fronts, w.replay.sheet, own.problem, own.vectors,
                                            w.memory.coupled, w.memory.direction, w.memory.change, own.partial,
@@ -167,7 +168,7 @@ __device__ __noinline__ int find_coupled_direction(const Work& w, const StepProb
 
 /// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
 /// its contacts in turn. `stuck`: with the positive Hessian, whose direction leads down.
-__device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled, ReplayStats& stats) {
+static __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled, ReplayStats& stats) {
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
   const bool touches = step.obstacles.count > 0;

@@ -10,10 +10,10 @@ namespace flash::sysid {
 /// (MotionStore): each simulates its own, and reads those of the others as they come. The programs need not
 /// know of each other, since all ask for the same motions in the same order.
 struct Shard {
-  int index = 0;                                      ///< from 0
-  int count = 1;                                      ///< programs; 1: all is simulated here
-  bool waits = true;                                  ///< for the others; else OthersMissing is thrown
-  double patience = 300;                              ///< without a motion of theirs, after which it is simulated here [s]
+  int index = 0;          ///< from 0
+  int count = 1;          ///< programs; 1: all is simulated here
+  bool waits = true;      ///< for the others; else OthersMissing is thrown
+  double patience = 300;  ///< without a motion of theirs, after which it is simulated here [s]
   std::function<void(const std::string&)> told = {};  ///< that such are simulated here
 };
 
