@@ -17,12 +17,9 @@ constexpr int most_portions = 20, portion_iterations = 5;  ///< as in Solver
 constexpr int most_updates = 30;          ///< of multipliers in a step, by the augmented Lagrangian
 constexpr double enough_progress = 0.25;  ///< of the violation by an update, without which the penalty grows
 constexpr double penalty_growth = 4;
-constexpr double greatest_growth = 1e4;
-constexpr double crushed_share = 1e-6;  ///< of the thickness, as in Solver
+constexpr double greatest_penalty = 1e4;  ///< over the first
+constexpr double crushed_share = 1e-6;    ///< of the thickness, as in Solver
 constexpr double kept_share = 0.5;  ///< of the thickness, below which no iteration with rows takes features
-constexpr int linear_problems = 6;  ///< an iteration, as in Solver
-constexpr double start_tolerance_share = 1e-3;  ///< of the tolerance, for the start of a search, as in Solver
-constexpr double gap_tolerance = 1e-9;          ///< of obstacles, as in Solver [m]
 
 /// The stiffness of all touches but what presses rows.
 std::vector<TouchStiffness> stiffness_beside_rows(const StepProblem& problem, const Iterate& iterate) {
@@ -133,7 +130,7 @@ void RowSolver::balance(const StepProblem& problem, int most_iterations, StepRep
 }
 
 void RowSolver::augment(const StepProblem& problem, int most_iterations, StepReport& report) {
-  const double greatest = greatest_growth * multipliers_.penalty;
+  const double greatest = greatest_penalty * multipliers_.penalty;
   double before = 1e300;
   for (int update = 0; update < most_updates; ++update) {
     iterate_to_balance(problem, most_iterations, w_, report);
