@@ -34,6 +34,7 @@ struct CommandLine {
   std::vector<std::string> outputs, inputs;
   std::string out;  ///< the output that may be a folder
   bool resumes = false;
+  bool adds = false;       ///< to what is there, and removes nothing
   bool is_shared = false;  ///< by several programs, each of which holds a part of it
   bool writes_asset = false, writes_recording = false;
 };
@@ -56,6 +57,7 @@ void collect(const CLI::App& app, CommandLine& line) {
         line.inputs.push_back(value);
     }
   }
+  if (app.get_name() == "merge") line.adds = true;
   if (app.get_name() == "export") line.writes_asset = true;
   if (app.get_name() == "import" || app.get_name() == "synth") line.writes_recording = true;
   for (const CLI::App* part : app.get_subcommands()) collect(*part, line);  // the verb
@@ -93,6 +95,7 @@ void check_folder(const std::string& out, const std::vector<std::string>& read, 
 void expect_spared_inputs(const CLI::App& app) {
   CommandLine line;
   collect(app, line);
+  if (line.adds) return;
   const Replaced replaced = line.writes_asset ? Replaced::assets : Replaced::results;
   expect_own_files(line.outputs, {}, Replaced::anything);
   std::erase_if(line.outputs, [](const std::string& path) { return !is_file(whole_path(path)); });

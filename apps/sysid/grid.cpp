@@ -115,6 +115,18 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
   return replays;
 }
 
+/// That the shares that are there are of this search: else each would wait for the others in vain.
+void expect_shares_of(const sysid::Fingerprint& search, const std::string& out) {
+  for (const std::string& file : sysid::grid_files(out)) {
+    const sysid::GridFile grid = sysid::load_grid_file(file);
+    const std::string changed =
+        grid.fingerprint ? sysid::difference(*grid.fingerprint, search) : "another version of the program";
+    if (!changed.empty())
+      throw data::InputError("--shard: " + file + " is of another search: " + changed +
+                             "; name another folder, or repeat the first command");
+  }
+}
+
 int run_grid(const CLI::App& verb, const GridOptions& options) {
   const sysid::PosteriorMethod posterior = posterior_method(options.posterior);
   stop_on_signals();
@@ -159,6 +171,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   end_after_signal();
   sysid::Fingerprint print = sysid::fingerprint(replays, settings);
   if (!options.posterior.empty()) print["posterior (--posterior)"] = options.posterior;
+  if (shard.count > 1) expect_shares_of(print, options.out);
   sysid::ResultsStore store(folder, settings.axes, names_of(recordings), print,
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace

@@ -26,31 +26,18 @@ struct MergeOptions {
   std::string out;
 };
 
-/// The grid.json of a search and of shares that were not the first.
-std::vector<std::string> grid_files(const std::string& run) {
-  std::vector<std::string> files;
-  const auto take = [&](const fs::path& folder) {
-    if (fs::exists(folder / "grid.json")) files.push_back((folder / "grid.json").string());
-  };
-  take(run);
-  std::error_code none;
-  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(run) / "shards", none))
-    take(entry.path());
-  return files;
-}
-
 /// That all are of one search: else nobody would ask for the motions of some.
 void expect_one_search(const std::vector<std::string>& runs, const std::string& out) {
   std::optional<std::pair<std::string, sysid::GridFile>> first;
   std::vector<std::string> files;
   for (const std::string& run : runs) {
-    const std::vector<std::string> of_run = grid_files(run);
+    const std::vector<std::string> of_run = sysid::grid_files(run);
     if (of_run.empty() || !fs::is_directory(fs::path(run) / "motions"))
       throw data::InputError(
           run + ": found no search with motions, expected a folder that flash-sysid grid --shard wrote");
     files.insert(files.end(), of_run.begin(), of_run.end());
   }
-  for (const std::string& file : grid_files(out)) files.push_back(file);
+  for (const std::string& file : sysid::grid_files(out)) files.push_back(file);
   for (const std::string& file : files) {
     sysid::GridFile grid = sysid::load_grid_file(file);
     if (!first) {

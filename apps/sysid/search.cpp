@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "apps/command_line/command_line.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
+#include "data/files/json_reader.h"
 #include "data/files/message_line.h"
 #include "data/files/text.h"
 #include "sim/device_error.h"
@@ -171,8 +173,19 @@ std::vector<sysid::NextExperiment> next_experiments(const Search& search, const 
   return ranked;
 }
 
-std::string share_text(const sysid::Shard& shard) {
-  return "share " + std::to_string(shard.index + 1) + " of " + std::to_string(shard.count);
+/// That a share which writes no answer has ended. `missing`: motions of the others that it was not to wait
+/// for.
+int end_of_share(const sysid::Shard& shard, const std::string& what, std::size_t missing,
+                 const CommonOptions& options) {
+  if (options.json)
+    std::cout << data::format_json(nlohmann::ordered_json{{"schema", "flash-sysid-share/1"},
+                                                          {"share", shard.index + 1},
+                                                          {"of", shard.count},
+                                                          {"missing", missing}});
+  else
+    say(options, "share " + std::to_string(shard.index + 1) + " of " + std::to_string(shard.count) +
+                     " is done" + what);
+  return exit_done;
 }
 
 // Judges what was found and writes the answer.
@@ -189,8 +202,7 @@ int conclude(Search& search, const sysid::ResultsStore& store, const sysid::Time
   }();
   std::vector<sysid::NextExperiment> experiments = next_experiments(search, answer, options);
   if (const sysid::Shard& shard = search.settings.shard; shard.index > 0) {
-    say(options, share_text(shard) + " is done; the first writes the answer, " + search.out);
-    return exit_done;
+    return end_of_share(shard, "; the first writes the answer, " + search.out, 0, options);
   }
   sysid::Summary summary = sysid::summarize(results, answer, search.replays, search.settings, search.asked);
   summary.next_experiments = std::move(experiments);
@@ -278,9 +290,10 @@ int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& 
   } catch (const data::Stopped&) {
     return kept();
   } catch (const sysid::OthersMissing& others) {
-    say(options, share_text(search.settings.shard) + " is done, and " + others.what() +
-                     "; flash-sysid merge brings shares together, --resume goes on");
-    return exit_done;
+    return end_of_share(search.settings.shard,
+                        std::string(", and ") + others.what() +
+                            "; flash-sysid merge brings shares together, --resume goes on",
+                        others.motions, options);
   } catch (const sim::DeviceError& error) {
     return kept(std::string(error.what()) + "; ");
   }

@@ -56,6 +56,10 @@ sysid::Shard parse_shard(const std::string& text, const std::function<const char
     const long first = slurm_number("SLURM_ARRAY_TASK_MIN", variable);
     const long id = slurm_number("SLURM_ARRAY_TASK_ID", variable);
     const long count = slurm_number("SLURM_ARRAY_TASK_COUNT", variable);
+    if (count == 1)
+      throw data::InputError(
+          "--shard slurm: found an array of one task, expected several; a task that is begun again by itself "
+          "has --shard I/N");
     return checked(id - first + 1, count,
                    "slurm, task " + std::to_string(id) + " of " + std::to_string(count) + " from " +
                        std::to_string(first) + " on");

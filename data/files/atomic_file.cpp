@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <list>
+#include <random>
 #include <regex>
 #include <system_error>
 #include <vector>
@@ -38,7 +39,8 @@ class TemporaryFile {
       throw InputError(path + ": is a device, a pipe or a socket, and is not written over");
     const std::filesystem::path parent = std::filesystem::path(path).parent_path();
     if (!parent.empty()) std::filesystem::create_directories(parent);
-    static std::atomic<unsigned> serial{0};
+    // Programs of two machines, or of two containers, may have one number.
+    static std::atomic<unsigned> serial{std::random_device()()};
     const std::string name =
         path + "." + std::to_string(::getpid()) + "-" + std::to_string(serial++) + ".tmp";
     const Descriptor file{::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)};

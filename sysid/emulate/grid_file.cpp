@@ -1,6 +1,8 @@
 #include "sysid/emulate/grid_file.h"
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
@@ -59,6 +61,19 @@ GridFile load_grid_file(const std::string& path) {
     for (const auto& [name, text] : texts.value().items()) fingerprint[name] = texts.string(name.c_str());
   }
   return grid;
+}
+
+std::vector<std::string> grid_files(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> files;
+  const auto take = [&](const fs::path& of) {
+    if (fs::exists(of / "grid.json")) files.push_back((of / "grid.json").string());
+  };
+  take(folder);
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(folder) / "shards", none))
+    take(entry.path());
+  return files;
 }
 
 }  // namespace flash::sysid

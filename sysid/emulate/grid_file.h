@@ -26,4 +26,7 @@ void save_grid_file(const GridFile& grid, const std::string& path);
 /// Throws data::InputError naming the file and what it lacks.
 GridFile load_grid_file(const std::string& path);
 
+/// The grid.json of a search and those of its shares (sysid/replay/shard.h), as far as they are there.
+std::vector<std::string> grid_files(const std::string& folder);
+
 }  // namespace flash::sysid

@@ -101,7 +101,23 @@ void check_holds_nothing(const std::string& folder, const std::vector<Axis>& axe
   for (const char* name : kAnswers) expect_none(name, "");
 }
 
+/// Those that another program may be writing to: all but its own.
+std::set<std::string> folders_of_others(const std::string& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_directory() && entry.path().filename() != "best")
+      names.insert(entry.path().filename().string());
+  return names;
+}
+
+void expect_no_shares(const std::string& folder) {
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(fs::path(folder) / "shards", none))
+    data::expect_not_held(entry.path().string());
+}
+
 void remove_results(const std::string& folder) {
+  fs::remove_all(fs::path(folder) / "shards");
   fs::remove(fs::path(folder) / "grid.json");
   for (const char* table : result_tables) fs::remove(fs::path(folder) / table);
   for (const char* name : kAnswers) fs::remove_all(fs::path(folder) / name);
@@ -122,14 +138,15 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
   const bool holds_search = fs::exists(path_of(folder, "grid.json"));
   if (!holds_search && existing != Existing::replace) check_holds_nothing(folder, axes);
   data::expect_not_held(folder);
+  if (writers == Writers::one) expect_no_shares(folder);
   fs::create_directories(folder);
   lock_ = ::open(path_of(folder, data::search_lock).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (lock_ < 0) throw std::system_error(errno, std::generic_category(), folder);
   try {
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
       throw data::InputError(folder + ": another run is writing to it; wait for it, or name another folder");
-    data::remove_leftovers(folder, writers == Writers::several ? std::set<std::string>{"motions", "shards"}
-                                                               : std::set<std::string>());
+    data::remove_leftovers(folder,
+                           writers == Writers::several ? folders_of_others(folder) : std::set<std::string>());
     if (existing == Existing::replace) remove_results(folder);
     if (!fs::exists(path_of(folder, "grid.json")))
       begin(axes, recordings, fingerprint);

@@ -16,6 +16,7 @@
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
 #include "data/files/sha256.h"
+#include "data/files/text.h"
 #include "data/machine/parallel.h"
 #include "sim/device_error.h"
 #include "sim/law/vertex_contact.h"
@@ -289,13 +290,14 @@ void MotionStore::prepare(const std::vector<WantedMotion>& wanted,
   std::vector<std::string> keys;
   for (const WantedMotion& motion : wanted) keys.push_back(motion_key(*motion.replay, motion.candidate));
   std::vector<WantedMotion> own;
-  std::vector<std::pair<std::string, WantedMotion>> of_others;
+  std::vector<MissingMotion> of_others;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (has(keys[i])) continue;
-    if (owner_of(i, keys.front(), shard_.count) == shard_.index)
+    const int owner = owner_of(i, keys.front(), shard_.count);
+    if (owner == shard_.index)
       own.push_back(wanted[i]);
     else
-      of_others.emplace_back(keys[i], wanted[i]);
+      of_others.push_back({keys[i], owner, wanted[i]});
   }
   simulate(own, simulated);
   if (!of_others.empty()) wait_for(std::move(of_others));
@@ -334,32 +336,57 @@ void MotionStore::simulate(const std::vector<WantedMotion>& wanted,
   });
 }
 
-void MotionStore::wait_for(std::vector<std::pair<std::string, WantedMotion>> missing) const {
+void MotionStore::wait_for(std::vector<MissingMotion> missing) const {
   using Clock = std::chrono::steady_clock;
-  const std::atomic<bool>* stop = missing.front().second.replay->settings.solver.stop;
+  const std::atomic<bool>* stop = missing.front().wanted.replay->settings.solver.stop;
   auto last = Clock::now();
-  bool is_told = false;
   while (true) {
     // A client of a network disk looks for new files where a folder is opened anew.
     const std::filesystem::directory_iterator opened(folder_);
-    if (std::erase_if(missing, [&](const auto& motion) { return has(motion.first); }) > 0)
+    if (std::erase_if(missing, [&](const MissingMotion& motion) { return has(motion.key); }) > 0)
       last = Clock::now();
     if (missing.empty()) return;
     if (!shard_.waits) throw OthersMissing(missing.size());
     if (stop != nullptr && *stop) throw data::Stopped();
-    if (std::chrono::duration<double>(Clock::now() - last).count() < shard_.patience) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(200));
-      continue;
-    }
-    if (shard_.told && !std::exchange(is_told, true))
-      shard_.told(std::to_string(missing.size()) +
-                  " motions of other shares did not come: they are simulated here");
-    // Those who wait begin at unlike ones.
-    const auto taken = missing.begin() +
-                       static_cast<std::ptrdiff_t>(static_cast<std::size_t>(shard_.index) % missing.size());
-    simulate({taken->second}, {});
-    missing.erase(taken);
+    const double waited = std::chrono::duration<double>(Clock::now() - last).count();
+    if (waited >= shard_.patience) give_up(missing);
+    const std::vector<WantedMotion> taken = take_of_absent(missing);
+    simulate(taken, {});
+    if (!taken.empty()) continue;
+    constexpr double kOften = 0.2, kSeldom = 2;  // of looking for files [s]
+    std::this_thread::sleep_for(std::chrono::duration<double>(std::clamp(0.05 * waited, kOften, kSeldom)));
   }
+}
+
+void MotionStore::give_up(const std::vector<MissingMotion>& missing) const {
+  const std::scoped_lock lock(shard_.absent->mutex);
+  for (const MissingMotion& motion : missing)
+    if (shard_.absent->indices.insert(motion.owner).second && shard_.told)
+      shard_.told("no motion of share " + std::to_string(motion.owner + 1) + " of " +
+                  std::to_string(shard_.count) + " came for " + data::format_short(shard_.patience) +
+                  " s: its share is simulated here");
+}
+
+std::vector<WantedMotion> MotionStore::take_of_absent(std::vector<MissingMotion>& missing) const {
+  const auto is_absent = [&](const MissingMotion& motion) {
+    return shard_.absent->indices.contains(motion.owner);
+  };
+  const std::scoped_lock lock(shard_.absent->mutex);
+  const auto end = std::stable_partition(missing.begin(), missing.end(), is_absent);
+  if (end == missing.begin()) return {};
+  // Those who wait begin at unlike ones, and simulate as many as they can at a time.
+  const auto count = static_cast<std::size_t>(end - missing.begin());
+  std::rotate(missing.begin(),
+              missing.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(shard_.index) * count /
+                                                            static_cast<std::size_t>(shard_.count)),
+              end);
+  const ReplaySettings& settings = missing.front().wanted.replay->settings;
+  const int at_once = settings.device == sim::Device::cuda ? settings.envs : settings.threads;
+  std::vector<WantedMotion> taken;
+  for (std::size_t i = 0; i < std::min(count, static_cast<std::size_t>(std::max(1, at_once))); ++i)
+    taken.push_back(missing[i].wanted);
+  missing.erase(missing.begin(), missing.begin() + std::ssize(taken));
+  return taken;
 }
 
 }  // namespace flash::sysid

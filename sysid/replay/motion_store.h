@@ -1,7 +1,6 @@
 #pragma once
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "sysid/replay/replay.h"
@@ -13,6 +12,13 @@ namespace flash::sysid {
 struct WantedMotion {
   const Replay* replay;
   ReplayCandidate candidate;
+};
+
+/// One that another shard is to simulate.
+struct MissingMotion {
+  std::string key;
+  int owner;
+  WantedMotion wanted;
 };
 
 /// What names a motion: the SHA-256 of everything that decides it.
@@ -55,7 +61,9 @@ class MotionStore {
   void read_or_simulate(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
                         const std::function<void(std::size_t, ReplayResult)>& finished) const;
   void simulate(const std::vector<WantedMotion>& wanted, const std::function<void()>& simulated) const;
-  void wait_for(std::vector<std::pair<std::string, WantedMotion>> missing) const;
+  void wait_for(std::vector<MissingMotion> missing) const;
+  void give_up(const std::vector<MissingMotion>& missing) const;
+  std::vector<WantedMotion> take_of_absent(std::vector<MissingMotion>& missing) const;
 
   std::string folder_;
   Shard shard_;

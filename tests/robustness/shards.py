@@ -3,6 +3,7 @@
 that of one program: results.csv, registrations.csv and keyframes.csv byte by byte, summary.json but for its seconds. Shares without
 a disk in common are brought together by merge. The recipes of docs/how_to/more_than_one_machine.md run as they stand."""
 import argparse
+import json
 import os
 import pathlib
 import random
@@ -72,8 +73,10 @@ def merged(results, command, alone, root):
 def gone(results, command, alone, root):
     """A share that never comes is simulated by the others."""
     out = root / "two_of_three"
-    running = [begin(command, "--resume", "--patience", 0.2, "--shard", f"{k}/3", "-o", out) for k in (1, 3)]
+    running = [begin(command, "--resume", "--patience", 3, "--shard", f"{k}/3", "-o", out) for k in (1, 3)]
     codes = [ended(process) for process in running]
+    waits = sum(said.count("simulated here") for _, said in codes)
+    results.append((waits <= 2, f"a share that does not come is given up {waits} times by two"))
     results.append((all(code == 0 for code, _ in codes), f"two of three shares: {codes}"))
     results.append(("simulated here" in codes[0][1] + codes[1][1], f"a share that does not come is not told: {codes}"))
     results.append((not same(out, alone), f"two of three shares: {same(out, alone)} differ"))
@@ -93,6 +96,19 @@ def refused(results, command, root, recording, sysid):
     says([*command, "-o", out, "--shard", "1/3", "--patience", "-1"], "--patience")
     says([sysid, "merge", root / "none", "-o", out], "none", "no search")
     says([sysid, "merge", recording, "-o", out], "no search")
+    says([*command, "--resume", "--tolerance", "1e-2", "--shard", "1/3", "-o", root / "own_2"], "--shard", "another search", "tolerance")
+    held = begin(command, "--resume", "--patience", 600, "--shard", "2/2", "-o", root / "held")
+    while not list((root / "held").glob("shards/2/grid.json")):
+        time.sleep(0.05)
+    says([*command, "-o", root / "held"], "held", "another run is writing")
+    says([*command, "--resume", "--shard", "2/2", "-o", root / "held"], "held", "another run is writing")
+    held.kill()
+    held.communicate()
+    program.must(*command, "--force", "-o", root / "held")
+    results.append((not (root / "held" / "shards").exists(), "--force leaves the shares of what it removed"))
+    done = program.must(*command, "--json", "--resume", "--own-share", "--shard", "2/3", "-o", root / "told")
+    results.append((json.loads(done.stdout)["missing"] > 0, f"a share that ends says {done.stdout}"))
+    program.must(sysid, "merge", root / "own_2", "-o", root / "own_1", "--quiet")
     other = [*command, "--tolerance", "1e-2", "--shard", "2/3", "--own-share", "-o", root / "other"]
     program.must(*other)
     says([sysid, "merge", root / "own_1", root / "other", "-o", out], "not the search of", "tolerance")

@@ -36,6 +36,10 @@ TEST(ShardOption, RefusesWhatIsNoShare) {
   for (const char* text : {"", "2", "0/3", "4/3", "a/3", "1/0", "1/2/3", "-1/3", "1.5/3", "1/999999999"})
     EXPECT_THROW(parse_shard(text), data::InputError) << text;
   EXPECT_THROW(of_task({}), data::InputError);
+  EXPECT_THROW(of_task({{"SLURM_ARRAY_TASK_ID", "3"},  // begun again by itself
+                        {"SLURM_ARRAY_TASK_MIN", "3"},
+                        {"SLURM_ARRAY_TASK_COUNT", "1"}}),
+               data::InputError);
   EXPECT_THROW(of_task({{"SLURM_ARRAY_TASK_ID", "9"},  // of tasks 0,9: their numbers have a gap
                         {"SLURM_ARRAY_TASK_MIN", "0"},
                         {"SLURM_ARRAY_TASK_COUNT", "2"}}),

@@ -227,8 +227,9 @@ TEST(MotionStore, AShareThatDoesNotComeIsSimulatedHere) {
                            }});
   store.prepare(six(replay));
   EXPECT_EQ(files_in(folder / "rollouts"), 6);
-  EXPECT_EQ(told,
-            std::vector<std::string>{"4 motions of other shares did not come: they are simulated here"});
+  EXPECT_EQ(told.size(), 2u);  // of each of the others, once
+  for (const std::string& what : told)
+    EXPECT_NE(what.find("of 3 came for 0 s: its share is simulated here"), std::string::npos) << what;
 }
 
 TEST(MotionStore, WithoutWaitingTheOwnShareIsKeptAndTheOthersAreMissing) {
