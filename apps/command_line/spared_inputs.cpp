@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 /// Options that name results. Every other one that names a file or a folder that is there names an input.
 const std::set<std::string> kOutputs = {"--out", "--flat", "--truth-out"};
 /// Whose values are words, whatever stands under that name.
-const std::set<std::string> kWords = {"--name", "--device"};
+const std::set<std::string> kWords = {"--name", "--device", "--shard"};
 /// What a search keeps for the next: read and written.
 const std::set<std::string> kKept = {"--rollouts", "--cache"};
 
@@ -46,9 +46,9 @@ bool takes_words(const CLI::Option& option) {
 void collect(const CLI::App& app, CommandLine& line) {
   for (const CLI::Option* option : app.get_options()) {
     const std::string name = option->get_name();
+    if (name == "--shard" && option->count() > 0) line.is_shared = true;
     if (option->count() == 0 || kKept.contains(name) || takes_words(*option)) continue;
     if (name == "--resume") line.resumes = true;
-    if (name == "--shard") line.is_shared = true;
     if (name == "--out") line.out = option->results().front();
     for (const std::string& value : option->results()) {
       if (kOutputs.contains(name))
@@ -90,12 +90,17 @@ void check_folder(const std::string& out, const std::vector<std::string>& read, 
   }
 }
 
+void expect_no_recording(const CommandLine& line) {
+  if (!line.writes_recording && holds_recording(whole_path(line.out)))
+    throw data::InputError(line.out + ": holds a recording, expected another folder for the result");
+}
+
 }  // namespace
 
 void expect_spared_inputs(const CLI::App& app) {
   CommandLine line;
   collect(app, line);
-  if (line.adds) return;
+  if (line.adds) return expect_no_recording(line);
   const Replaced replaced = line.writes_asset ? Replaced::assets : Replaced::results;
   expect_own_files(line.outputs, {}, Replaced::anything);
   std::erase_if(line.outputs, [](const std::string& path) { return !is_file(whole_path(path)); });
@@ -110,8 +115,7 @@ void expect_spared_inputs(const CLI::App& app) {
   expect_own_files(line.outputs, read, replaced);
   if (!is_folder(whole_path(line.out))) return;
   check_folder(line.out, read, line.resumes);
-  if (!line.writes_recording && holds_recording(whole_path(line.out)))
-    throw data::InputError(line.out + ": holds a recording, expected another folder for the result");
+  expect_no_recording(line);
 }
 
 }  // namespace flash

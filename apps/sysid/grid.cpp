@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -117,14 +116,10 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
 
 /// That the shares that are there are of this search: else each would wait for the others in vain.
 void expect_shares_of(const sysid::Fingerprint& search, const std::string& out) {
-  for (const std::string& file : sysid::grid_files(out)) {
-    const sysid::GridFile grid = sysid::load_grid_file(file);
-    const std::string changed =
-        grid.fingerprint ? sysid::difference(*grid.fingerprint, search) : "another version of the program";
-    if (!changed.empty())
-      throw data::InputError("--shard: " + file + " is of another search: " + changed +
-                             "; name another folder, or repeat the first command");
-  }
+  if (const auto other = sysid::other_search(search, sysid::grid_files(out)))
+    throw data::InputError("--shard: " + other->file + " is of another search: " + other->difference +
+                           "; name another folder, repeat the first command, or remove " +
+                           fs::path(other->file).parent_path().string() + " where that was a slip");
 }
 
 int run_grid(const CLI::App& verb, const GridOptions& options) {
@@ -133,9 +128,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   if (options.max_hours > 0) stop_after(options.max_hours);
   check_options(options);
   sysid::Shard shard = shard_of(options.shard);
-  shard.told = [said = std::make_shared<std::atomic<bool>>()](const std::string& what) {
-    if (!said->exchange(true)) warn(what);
-  };
+  shard.told = [](const std::string& what) { warn(what); };
   const std::string folder = folder_of_shard(options.out, shard);
   const auto begin = std::chrono::steady_clock::now();
   const std::string grid_file = (fs::path(folder) / "grid.json").string();

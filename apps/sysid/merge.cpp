@@ -3,7 +3,8 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <string>
+#include <vector>
 
 #include "apps/command_line/command_line.h"
 #include "apps/sysid/options.h"
@@ -28,28 +29,24 @@ struct MergeOptions {
 
 /// That all are of one search: else nobody would ask for the motions of some.
 void expect_one_search(const std::vector<std::string>& runs, const std::string& out) {
-  std::optional<std::pair<std::string, sysid::GridFile>> first;
   std::vector<std::string> files;
   for (const std::string& run : runs) {
     const std::vector<std::string> of_run = sysid::grid_files(run);
-    if (of_run.empty() || !fs::is_directory(fs::path(run) / "motions"))
-      throw data::InputError(
-          run + ": found no search with motions, expected a folder that flash-sysid grid --shard wrote");
+    if (of_run.empty())
+      throw data::InputError(run +
+                             ": found no search, expected a folder that flash-sysid grid --shard wrote");
+    if (!fs::is_directory(fs::path(run) / "motions"))
+      throw data::InputError(run +
+                             ": found no folder motions in it, expected the motions of the search there, "
+                             "where it keeps them without --rollouts");
     files.insert(files.end(), of_run.begin(), of_run.end());
   }
   for (const std::string& file : sysid::grid_files(out)) files.push_back(file);
-  for (const std::string& file : files) {
-    sysid::GridFile grid = sysid::load_grid_file(file);
-    if (!first) {
-      first.emplace(file, std::move(grid));
-      continue;
-    }
-    const std::string changed = grid.fingerprint && first->second.fingerprint
-                                    ? sysid::difference(*first->second.fingerprint, *grid.fingerprint)
-                                    : "another version of the program";
-    if (!changed.empty())
-      throw data::InputError(file + ": this is not the search of " + first->first + ": " + changed);
-  }
+  const sysid::Fingerprint first =
+      sysid::load_grid_file(files.front()).fingerprint.value_or(sysid::Fingerprint());
+  if (const auto other = sysid::other_search(first, files))
+    throw data::InputError(other->file + ": this is not the search of " + files.front() + ": " +
+                           other->difference);
 }
 
 int run_merge(const MergeOptions& options) {

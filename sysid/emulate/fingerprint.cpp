@@ -264,4 +264,14 @@ std::string difference(const Fingerprint& was, const Fingerprint& is) {
   return more == 0 ? first : first + ", and " + std::to_string(more) + " more";
 }
 
+std::optional<OtherSearch> other_search(const Fingerprint& search, const std::vector<std::string>& files) {
+  for (const std::string& file : files) {
+    const GridFile grid = load_grid_file(file);
+    std::string changed = grid.fingerprint ? difference(*grid.fingerprint, search)
+                                           : "it comes from another version of the program";
+    if (!changed.empty()) return OtherSearch{file, std::move(changed)};
+  }
+  return std::nullopt;
+}
+
 }  // namespace flash::sysid

@@ -1,5 +1,6 @@
 #pragma once
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,5 +16,13 @@ Fingerprint fingerprint(const std::vector<Replay>& replays, const GridSettings& 
 
 /// "" where equal, else one phrase: "time_step_s was 0.01 and is 0.005, and 2 more".
 std::string difference(const Fingerprint& was, const Fingerprint& is);
+
+/// A search's file that is of another one, and by what.
+struct OtherSearch {
+  std::string file, difference;
+};
+
+/// The first of those `files`, each a grid.json, that is of another search; empty where all are of this one.
+std::optional<OtherSearch> other_search(const Fingerprint& search, const std::vector<std::string>& files);
 
 }  // namespace flash::sysid

@@ -8,6 +8,7 @@
 #include "data/files/error.h"
 #include "data/files/json_reader.h"
 #include "data/files/sha256.h"
+#include "data/files/text.h"
 
 namespace flash::sysid {
 namespace {
@@ -63,16 +64,22 @@ GridFile load_grid_file(const std::string& path) {
   return grid;
 }
 
-std::vector<std::string> grid_files(const std::string& folder) {
+std::vector<std::string> share_folders(const std::string& folder) {
   namespace fs = std::filesystem;
-  std::vector<std::string> files;
-  const auto take = [&](const fs::path& of) {
-    if (fs::exists(of / "grid.json")) files.push_back((of / "grid.json").string());
-  };
-  take(folder);
+  std::vector<std::string> folders;
   std::error_code none;
   for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(folder) / "shards", none))
-    take(entry.path());
+    if (data::parse_integer(entry.path().filename().string()) && entry.is_directory(none))
+      folders.push_back(entry.path().string());
+  return folders;
+}
+
+std::vector<std::string> grid_files(const std::string& folder) {
+  std::vector<std::string> folders = share_folders(folder), files;
+  folders.insert(folders.begin(), folder);
+  for (const std::string& of : folders)
+    if (const auto file = std::filesystem::path(of) / "grid.json"; std::filesystem::exists(file))
+      files.push_back(file.string());
   return files;
 }
 

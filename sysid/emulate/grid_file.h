@@ -26,6 +26,9 @@ void save_grid_file(const GridFile& grid, const std::string& path);
 /// Throws data::InputError naming the file and what it lacks.
 GridFile load_grid_file(const std::string& path);
 
+/// Folders of the shares of a search beside the first, shards/NUMBER, as far as they are there.
+std::vector<std::string> share_folders(const std::string& folder);
+
 /// The grid.json of a search and those of its shares (sysid/replay/shard.h), as far as they are there.
 std::vector<std::string> grid_files(const std::string& folder);
 

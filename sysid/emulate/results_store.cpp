@@ -111,16 +111,26 @@ std::set<std::string> folders_of_others(const std::string& folder) {
 }
 
 void expect_no_shares(const std::string& folder) {
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(fs::path(folder) / "shards", none))
-    data::expect_not_held(entry.path().string());
+  for (const std::string& share : share_folders(folder)) data::expect_not_held(share);
 }
 
-void remove_results(const std::string& folder) {
-  fs::remove_all(fs::path(folder) / "shards");
+void remove_own_files(const std::string& folder) {
   fs::remove(fs::path(folder) / "grid.json");
   for (const char* table : result_tables) fs::remove(fs::path(folder) / table);
   for (const char* name : kAnswers) fs::remove_all(fs::path(folder) / name);
+}
+
+/// Of the search and of its shares; what else lies there stays.
+void remove_results(const std::string& folder) {
+  remove_own_files(folder);
+  std::error_code holds_more;
+  for (const std::string& share : share_folders(folder)) {
+    remove_own_files(share);
+    fs::remove(path_of(share, data::search_lock));
+    fs::remove(share, holds_more);
+  }
+  if (const fs::path shares = fs::path(folder) / "shards"; fs::is_directory(fs::symlink_status(shares)))
+    if (fs::is_empty(shares)) fs::remove(shares, holds_more);
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -145,6 +155,7 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
   try {
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
       throw data::InputError(folder + ": another run is writing to it; wait for it, or name another folder");
+    if (writers == Writers::one) expect_no_shares(folder);  // one may have begun since
     data::remove_leftovers(folder,
                            writers == Writers::several ? folders_of_others(folder) : std::set<std::string>());
     if (existing == Existing::replace) remove_results(folder);

@@ -10,6 +10,7 @@
 #include "sim/cuda/batch_replay.h"
 #include "sim/cuda/hold_motion.h"
 #include "sim/newton/solver.h"
+#include "tests/sim/cuda/replayed_steps.h"
 #include "tests/sim/sheet_scene.h"
 
 /// Sheets on obstacles, and their motions by the processor.
@@ -18,8 +19,6 @@ namespace flash::sim::cuda::contact_scenes {
 using data::Points;
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
-
-inline constexpr double time_step = 0.01;
 
 struct Scene {
   std::string name;
@@ -159,20 +158,9 @@ inline Trajectory by_processor(const Scene& scene, double tolerance, int stale_f
     const StepReport report = solver.step(environment);
     trajectory.positions.push_back(environment.state.positions);
     for (const Vector3d& force : report.hold_forces) trajectory.forces.push_back(force);
-    trajectory.steps.push_back({report.residual, report.penetration_max, report.iterations, report.solves,
-                                report.factorizations, report.substeps, report.converged});
+    trajectory.steps.push_back(step_of(report));
   }
   return trajectory;
-}
-
-inline ReplaySettings settings_of(int steps, double tolerance) {
-  ReplaySettings settings;
-  settings.time_step = time_step;
-  settings.tolerance = tolerance;
-  settings.stale_factor_solves = 0;
-  settings.steps = steps;
-  for (int k = 1; k <= steps; ++k) settings.kept_steps.push_back(k);
-  return settings;
 }
 
 inline ReplayEnvironment for_device(const Scene& scene) {

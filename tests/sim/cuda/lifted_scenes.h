@@ -11,6 +11,7 @@
 #include "sim/cuda/batch_replay.h"
 #include "sim/newton/solver.h"
 #include "tests/sim/cuda/meshes.h"
+#include "tests/sim/cuda/replayed_steps.h"
 #include "tests/sim/sheet_scene.h"
 
 /// Sheets that are lifted or fly, without obstacles, and their motions by the processor.
@@ -18,8 +19,6 @@ namespace flash::sim::cuda::lifted_scenes {
 
 using data::Points;
 using Eigen::Vector3d;
-
-inline constexpr double time_step = 0.01;
 
 /// A replay of one environment.
 struct Scene {
@@ -154,20 +153,9 @@ inline Trajectory by_processor(const Scene& scene, double tolerance) {
         environment.holds.push_back(support(held.vertex, held.axes, held.target));
     const StepReport report = solver.step(environment);
     trajectory.positions.push_back(environment.state.positions);
-    trajectory.steps.push_back({report.residual, report.penetration_max, report.iterations, report.solves,
-                                report.factorizations, report.substeps, report.converged});
+    trajectory.steps.push_back(step_of(report));
   }
   return trajectory;
-}
-
-inline ReplaySettings settings_of(int steps, double tolerance) {
-  ReplaySettings settings;
-  settings.time_step = time_step;
-  settings.tolerance = tolerance;
-  settings.stale_factor_solves = 0;
-  settings.steps = steps;
-  for (int k = 1; k <= steps; ++k) settings.kept_steps.push_back(k);
-  return settings;
 }
 
 /// Largest distance of a vertex at any time, as a share of the sheet's size.

@@ -202,7 +202,7 @@ TEST(SerialStep, WhatHoldsCarryIsOnTheArcOfTheirFrameInTheMiddleOfAStep) {
 TEST(SerialStep, AMotionDoesNotDependOnWhatIsOnChip) {
   for (const contact_scenes::Scene& scene : contact_scenes::scenes(4)) {
     SCOPED_TRACE(scene.name);
-    const ReplaySettings settings = contact_scenes::settings_of(3, 1e-3);
+    const ReplaySettings settings = settings_of(3, 1e-3);
     const ReplayEnvironment environment = contact_scenes::for_device(scene);
     using contact_scenes::Trajectory;
     EXPECT_EQ(by_text<Trajectory>(scene.plan, environment, settings, true).positions,

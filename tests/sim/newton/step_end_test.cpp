@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "sim/cuda/hold_motion.h"
 #include "sim/newton/step_problem.h"
 #include "tests/sim/cuda/serial_replay.h"
 #include "tests/sim/sheet_scene.h"
@@ -78,12 +79,7 @@ struct Pulled {
     return problem.balanced(at, tolerance);
   }
   bool balanced_by_the_text_of_a_device() const {
-    cuda::ReplayEnvironment replay;
-    replay.material = environment.materials[0];
-    replay.gravity = environment.gravity;
-    replay.loads = environment.loads;
-    replay.positions = environment.state.positions;
-    replay.velocities = environment.state.velocities;
+    const cuda::ReplayEnvironment replay = cuda::replay_environment(environment, nullptr);
     cuda::ReplaySettings settings;
     settings.time_step = h;
     settings.tolerance = tolerance;
@@ -119,12 +115,7 @@ int parts_of_a_step(double weights, bool by_text) {
                   {.time_step = Pulled::h, .max_iterations = 0, .tolerance = 1e-9, .halvings = 1});
     return solver.step(environment).substeps;
   }
-  cuda::ReplayEnvironment replay;
-  replay.material = environment.materials[0];
-  replay.gravity = environment.gravity;
-  replay.loads = environment.loads;
-  replay.positions = environment.state.positions;
-  replay.velocities = environment.state.velocities;
+  const cuda::ReplayEnvironment replay = cuda::replay_environment(environment, nullptr);
   cuda::ReplaySettings settings;
   settings.time_step = Pulled::h;
   settings.max_iterations = 0;
