@@ -19,6 +19,7 @@
 #include "sysid/report/export_asset.h"
 #include "sysid/report/next_steps.h"
 #include "sysid/report/search_folder.h"
+#include "sysid/report/searched_mesh.h"
 
 namespace flash {
 namespace {
@@ -36,6 +37,10 @@ int run_export(const ExportOptions& options) {
   const sysid::Summary summary = sysid::load_search_folder(options.run).summary;
   const data::Asset base = data::load_asset(options.asset.empty() ? summary.asset : options.asset);
   data::check_file_free(options.out, options.common.force);
+  for (const sysid::SummaryRecording& recording : summary.recordings)
+    if (!recording.own_mesh)
+      sysid::expect_as_searched({.mesh = recording.mesh, .digest = recording.mesh_sha256},
+                                options.run + "/summary.json", "recordings." + recording.name + ".mesh");
   const data::Asset tuned = sysid::tuned_asset(base, summary);
   std::vector<std::string> notices;
   const bool solid = tuned.element_type == data::ElementType::tetrahedron;

@@ -26,6 +26,7 @@
 #include "sysid/report/identified_recording.h"
 #include "sysid/report/overlay.h"
 #include "sysid/report/overlay_image.h"
+#include "sysid/report/searched_mesh.h"
 #include "sysid/report/settings_texts.h"
 
 namespace flash {
@@ -150,6 +151,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
       sysid::identified_recording(asset, data::recording_sha256(recording));
   const bool as_answered = identified && simulated.mesh.empty();
   if (as_answered) {
+    sysid::expect_as_searched(identified->mesh, asset.source, "identification.recordings.mesh");
     simulated.mesh = identified->mesh.mesh;
     simulated.cell_scale = identified->mesh.cell_scale;
   }

@@ -14,10 +14,11 @@ std::optional<double> number_of(const nlohmann::json& object, const char* name) 
   return found->get<double>();
 }
 
+/// Also of a number, as people write by hand.
 std::optional<std::string> text_of(const nlohmann::json& object, const char* name) {
   const auto found = object.find(name);
-  if (found == object.end() || !found->is_string()) return std::nullopt;
-  return found->get<std::string>();
+  if (found == object.end() || found->is_null()) return std::nullopt;
+  return found->is_string() ? found->get<std::string>() : found->dump();
 }
 
 }  // namespace
@@ -32,6 +33,7 @@ std::optional<IdentifiedRecording> identified_recording(const data::Asset& asset
     IdentifiedRecording found{number_of(recording, "horizon_s"), number_of(recording, "score_m"),
                               number_of(recording, "grasp_size_m")};
     found.mesh.mesh = text_of(recording, "mesh").value_or("");
+    found.mesh.digest = text_of(recording, "mesh_sha256").value_or("");
     if (const nlohmann::json solver = of("solver"); solver.is_object())
       found.mesh.cell_scale = cell_scale_of(text_of(solver, "cell_scale"), "identification.solver");
     if (recordings.size() == 1) {  // earlier programs kept what all have in common

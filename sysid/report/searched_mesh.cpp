@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "data/files/atomic_file.h"
 #include "data/files/error.h"
+#include "data/files/sha256.h"
 #include "data/files/text.h"
 #include "data/mesh/procedural_mesh.h"
 #include "data/recording/recording_digest.h"
@@ -50,6 +52,24 @@ std::string named_mesh(const std::string& mesh) {
   return data::is_made_on_the_spot(mesh) ? mesh : std::filesystem::absolute(mesh).lexically_normal().string();
 }
 
+std::string mesh_digest(const std::string& mesh) {
+  return mesh.empty() || data::is_made_on_the_spot(mesh) ? "" : data::sha256(data::read_file(mesh));
+}
+
+void expect_as_searched(const SearchedMesh& mesh, const std::string& source, const std::string& field) {
+  if (mesh.mesh.empty()) return;
+  if (!data::is_made_on_the_spot(mesh.mesh) && !std::filesystem::exists(mesh.mesh))
+    throw data::input_error(source, field,
+                            mesh.mesh +
+                                " is missing, expected the mesh that was searched; give --mesh "
+                                "where it lies elsewhere");
+  data::Recording on;
+  data::load_object_mesh(mesh.mesh, source, field, on);
+  if (!mesh.digest.empty() && mesh_digest(mesh.mesh) != mesh.digest)
+    throw data::input_error(source, field,
+                            mesh.mesh + " has changed since the search; give --mesh for the one that counts");
+}
+
 double cell_scale_of(const std::optional<std::string>& text, const std::string& source) {
   if (!text) return 1;
   const std::optional<double> scale = data::parse_number(*text);
@@ -65,14 +85,19 @@ SearchedMesh searched_mesh(const Summary& summary, const std::string& run, const
   const double scale = cell_scale_of(setting(summary, "cell_scale"), path);
   const std::vector<std::string> meshes = meshes_of(summary, path);
   const std::string sha256 = data::recording_sha256(recording);
+  const auto as_searched = [&](std::size_t r) {
+    SearchedMesh found{meshes[r], scale, summary.recordings[r].mesh_sha256};
+    expect_as_searched(found, path, "recordings." + summary.recordings[r].name + ".mesh");
+    return found;
+  };
   for (std::size_t r = 0; r < meshes.size(); ++r)
     if (summary.recordings[r].sha256 == sha256)
-      return {summary.recordings[r].own_mesh ? "" : meshes[r], scale};
+      return summary.recordings[r].own_mesh ? SearchedMesh{"", scale} : as_searched(r);
   const double here = extent_of("", path, recording);
   std::string sizes;
-  for (const std::string& mesh : meshes) {
-    const double searched = extent_of(mesh, path, recording);
-    if (std::abs(searched - here) <= kSame * here) return {mesh, scale};
+  for (std::size_t r = 0; r < meshes.size(); ++r) {
+    const double searched = extent_of(as_searched(r).mesh, path, recording);
+    if (std::abs(searched - here) <= kSame * here) return as_searched(r);
     sizes += (sizes.empty() ? "" : ", ") + data::format_short(searched) + " m";
   }
   throw data::input_error(recording.source, "object.mesh",

@@ -63,6 +63,7 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
   recording.sha256 = data::recording_sha256(replay.recording, replay.object_mesh);
   recording.mesh = named_mesh(replay);
   recording.own_mesh = replay.settings.mesh.empty();
+  if (!recording.own_mesh) recording.mesh_sha256 = mesh_digest(recording.mesh);
   recording.offset = score.offset;
   recording.yaw = score.yaw;
   recording.time_offset = score.time_offset;

@@ -56,6 +56,7 @@ Json to_json(const SummaryRecording& recording) {
   if (!recording.mesh.empty()) {
     json["mesh"] = recording.mesh;
     json["own_mesh"] = recording.own_mesh;
+    if (!recording.mesh_sha256.empty()) json["mesh_sha256"] = recording.mesh_sha256;
   }
   json["offset"] = {recording.offset.x(), recording.offset.y(), recording.offset.z()};
   json["yaw"] = recording.yaw;
@@ -163,12 +164,14 @@ SummaryRecording read_recording(const data::JsonObject& json) {
                       "misfit_reach_s", "misfit_reach_m",  "misfit_gain",  "model_fits",
                       "keyframes",      "keyframes_worth", "markers",      "horizon_s",
                       "frames",         "misfit_draws",    "error_cost",   "spread_m",
-                      "score_on_mesh",  "horizon_of",      "mesh",         "own_mesh"});
+                      "score_on_mesh",  "horizon_of",      "mesh",         "own_mesh",
+                      "mesh_sha256"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
   recording.mesh = json.string("mesh", "");
   recording.own_mesh = json.boolean("own_mesh", false);
+  recording.mesh_sha256 = json.string("mesh_sha256", "");
   recording.offset = json.vector("offset", 3);
   recording.yaw = json.number("yaw");
   recording.time_offset = json.number("time_offset");

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "sysid/report/export_asset.h"
+#include "tests/data/temporary_folder.h"
 #include "tests/sysid/summary_fixture.h"
 
 namespace flash::sysid {
@@ -40,6 +43,21 @@ TEST(IdentifiedRecording, IsWhatTheSearchWeighedAndHowItScored) {
   EXPECT_FALSE(second->horizon_s);   // each has its own
   EXPECT_EQ(second->score, 0.003);
   EXPECT_FALSE(identified_recording(asset, std::string(64, 'c')));
+}
+
+TEST(IdentifiedRecording, ScaleOfCellsMayBeANumber) {
+  Summary summary = example_summary();
+  summary.settings["cell_scale"] = "0.5";
+  data::Asset asset = tuned(summary);
+  nlohmann::json identification = nlohmann::json::parse(asset.identification);
+  identification["solver"]["cell_scale"] = 0.25;
+  asset.identification = identification.dump();
+  EXPECT_EQ(identified_recording(asset, std::string(64, 'a'))->mesh.cell_scale, 0.25);
+  identification["solver"]["cell_scale"] = true;
+  asset.identification = identification.dump();
+  EXPECT_NE(
+      data::input_error_of([&] { identified_recording(asset, std::string(64, 'a')); }).find("cell_scale"),
+      std::string::npos);
 }
 
 TEST(IdentifiedRecording, AnotherScoreHasAReason) {

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
+#include "data/files/atomic_file.h"
 #include "data/recording/recording_digest.h"
 #include "tests/data/temporary_folder.h"
 #include "tests/sysid/short_lift.h"
@@ -65,6 +68,29 @@ TEST_F(SearchedMeshOf, ScalesThatAreNoneAreRefused) {
               std::string::npos)
         << text;
   }
+}
+
+TEST(SearchedMesh, AFileThatIsMissingOrHasChangedIsNamed) {
+  const std::string path = (std::filesystem::path(testing::TempDir()) / "searched_mesh_test.obj").string();
+  const auto write = [&](const char* last) {
+    data::write_atomically(path, std::string("v 0 0 0\nv 1 0 0\nv 0 ") + last + " 0\nf 1 2 3\n");
+  };
+  const auto error_of = [&](const SearchedMesh& mesh) {
+    return data::input_error_of([&] { expect_as_searched(mesh, "summary.json", "recordings.a.mesh"); });
+  };
+  write("1");
+  const std::string digest = mesh_digest(path);
+  EXPECT_EQ(digest.size(), 64U);
+  EXPECT_EQ(mesh_digest("sheet:0.2x0.2:0.02"), "");
+  expect_as_searched({.mesh = path, .digest = digest}, "summary.json", "recordings.a.mesh");
+  write("2");
+  EXPECT_NE(error_of({.mesh = path, .digest = digest}).find("has changed since the search"),
+            std::string::npos);
+  expect_as_searched({.mesh = path}, "summary.json", "recordings.a.mesh");  // of an earlier program
+  std::filesystem::remove(path);
+  EXPECT_NE(error_of({.mesh = path, .digest = digest}).find("summary.json: recordings.a.mesh: "),
+            std::string::npos);
+  EXPECT_NE(error_of({.mesh = "sheet:0.2x0.2:no"}).find("summary.json"), std::string::npos);
 }
 
 }  // namespace
