@@ -37,7 +37,7 @@ struct HandEyeOptions {
   DatasetChoice dataset;
   std::string setup;
   calib::Use use = calib::Use::workspace;
-  bool time_offset = false;
+  calib::ClockOffset clock_offset = calib::ClockOffset::where_it_matters;
   LensOption lens;
   std::optional<double> target_size_sd = {};
   bool size_as_stated = false;
@@ -202,7 +202,7 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
                                  [](const calib::Frame& frame) { return frame.image.empty(); });
   calib::ImageCalibration solved;
   if (pairs) {
-    if (options.time_offset)
+    if (options.clock_offset == calib::ClockOffset::solved)
       throw data::InputError(dataset.source + ": pairs of poses have no time; leave --time-offset out");
     const Progress progress("solving", options.common);
     solved.calibration = calib::calibrate_pairs(setup, calib::pair_observations(dataset), settings);
@@ -250,7 +250,7 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   settings.target_size_sd = options.target_size_sd;
   settings.size_as_stated = options.size_as_stated;
   settings.threads = options.common.threads;
-  settings.refine.bundle.unknowns.time_offsets = options.time_offset;
+  settings.clock_offset = options.clock_offset;
   const calib::ImageCalibration solved = solve(options, setup, dataset, settings, phases);
 
   const calib::ExtrinsicsInputs inputs = calib::relative_to(
@@ -315,10 +315,14 @@ void add_handeye_verb(CLI::App& app, Action& action) {
       ->default_str("workspace");
   add_lens_option(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd, options->size_as_stated);
-  verb->add_flag(
-      "--time-offset", options->time_offset,
-      "Solve for a constant time between pictures and poses, where the poses are a stream over time "
-      "and pictures are named by their time");
+  verb->add_flag_function(
+      "--time-offset,!--no-time-offset",
+      [options](std::int64_t asked) {
+        options->clock_offset = asked > 0 ? calib::ClockOffset::solved : calib::ClockOffset::none;
+      },
+      "Solve for a constant time between pictures and poses, where the poses are a stream over time and "
+      "pictures are named by their time, or take them to have one clock (default: solved for where the robot "
+      "moves at the pictures)");
   verb->add_flag("--no-depth", options->dataset.no_depth, "Leave depth pictures out");
   verb->add_option("--parent-frame", options->parent, "Name of the gripper's or the base's frame");
   verb->add_option("--child-frame", options->child, "Name of the camera's frame")->capture_default_str();

@@ -95,7 +95,7 @@ calib::CellRecording solved_recording(const Recording& recording, const Register
   settings.lens = options.lens.knowledge;
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.threads = options.common.threads;
-  settings.refine.bundle.unknowns.time_offsets = recording.time_offset;
+  settings.clock_offset = recording.time_offset ? calib::ClockOffset::solved : calib::ClockOffset::none;
   calib::CellRecording solved;
   for (const calib::Frame& frame : dataset.frames) {
     solved.T_base_gripper.push_back(frame.T_base_gripper);

@@ -89,6 +89,17 @@ std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecord
          ", on " + (is_named ? setting("score_of") : "the mesh of the answer") + on_mesh;
 }
 
+/// "12 +- 3": how much later observations were made than their times say [ms].
+std::string clock_text(const sysid::SummaryRecording& recording) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.0f", 1000 * recording.time_offset);
+  if (!recording.time_offset_sd || *recording.time_offset_sd == 0) return text;
+  const double sd = 1000 * *recording.time_offset_sd;
+  std::snprintf(text, sizeof text, sd < 1 ? "%.1f +- %.1f" : "%.0f +- %.0f", 1000 * recording.time_offset,
+                sd);
+  return text;
+}
+
 void print_solver_check(const sysid::Summary& summary) {
   if (!summary.solver_check.empty()) std::printf("Other solutions of the estimate:\n");
   for (const sysid::SolverCheck& check : summary.solver_check)
@@ -104,10 +115,10 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
                 value_text(finding, label.unit, summary.by_points).c_str(), edge_of(finding).c_str());
   }
   for (const sysid::SummaryRecording& recording : summary.recordings)
-    std::printf("%-16s %s; offset %.1f %.1f %.1f mm, clock %.0f ms\n",
+    std::printf("%-16s %s; offset %.1f %.1f %.1f mm, clock %s ms\n",
                 data::message_line(recording.name).c_str(), score_text(summary, recording).c_str(),
                 1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
-                1000 * recording.time_offset);
+                clock_text(recording).c_str());
   print_solver_check(summary);
   if (!summary.next_experiments.empty() || summary.by_points || summary.exit_code != exit_done)
     for (const std::string& step : sysid::next_steps(summary)) std::printf("Next: %s\n", step.c_str());

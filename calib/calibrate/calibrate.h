@@ -19,6 +19,13 @@
 
 namespace flash::calib {
 
+/// Whether the time between pictures and poses is an unknown, where the poses are a stream over time.
+enum class ClockOffset {
+  where_it_matters,  ///< the robot moves at the pictures
+  solved,
+  none  ///< one clock; an offset that stands out is warned of
+};
+
 struct CalibrateSettings {
   Use use = Use::workspace;
   ViewSelectionSettings selection;
@@ -35,7 +42,8 @@ struct CalibrateSettings {
   std::optional<double> target_size_sd = {};
   bool size_as_stated = false;  ///< it is not solved for, and what it may be off counts in the covariance
   LensKnowledge lens = LensKnowledge::near;
-  LensCovariance lens_covariance = LensCovariance::Zero();  ///< as it was stated; zero: nothing was
+  LensCovariance lens_covariance = LensCovariance::Zero();   ///< as it was stated; zero: nothing was
+  ClockOffset clock_offset = ClockOffset::where_it_matters;  ///< of pictures (calibrate_images())
   bool motions = true;  ///< of camera and target are looked for; else both are taken to have stood still
   int threads = 1;      ///< of held-out residuals and splits; 0: one a processor
 };

@@ -7,6 +7,7 @@
 #include "calib/calibrate/plausibility.h"
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/linearization.h"
+#include "calib/uncertainty/corner_noise_ratios.h"
 #include "data/files/error.h"
 
 namespace flash::calib {
@@ -43,6 +44,21 @@ struct Problem {
     return calibrate(setup, camera, points, symmetries, views, settings);
   }
 };
+
+std::vector<double> stamps_of(const Dataset& dataset) {
+  std::vector<double> stamps;
+  for (const Frame& frame : dataset.frames) stamps.push_back(frame.stamp);
+  return stamps;
+}
+
+/// Whether an offset of 20 ms puts the gripper as far off as arms repeat to, or farther.
+bool moves_at_pictures(const Dataset& dataset) {
+  constexpr double kRepeatable = 1e-4, kUsualOffset = 0.02;  // [m, s]
+  std::vector<Observation> views(dataset.frames.size());
+  for (Observation& view : views) view.T_camera_target = {Eigen::Isometry3d::Identity()};
+  return kUsualOffset * rms_speed(placed(*dataset.stream, stamps_of(dataset), 0, std::move(views))) >
+         kRepeatable;
+}
 
 TimeOffset offset_left(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance) {
   const int column = shared_columns(bundle, unknowns).time_offsets.front();
@@ -92,21 +108,35 @@ void check_time(const Dataset& dataset, const CalibrateSettings& settings, Calib
   tell_first(
       result,
       formatted("pictures and poses are %.1f +- %.1f ms apart, and with that the camera is %.1f mm and "
-                "%.2f deg from where it is here: --time-offset takes that into account",
+                "%.2f deg from where it is here: leave --no-time-offset out",
                 1e3 * offset.estimate, 1e3 * offset.sd, 1e3 * away.head<3>().norm(),
                 away.tail<3>().norm() * 180 / M_PI),
       refused || away.dot(covariance.ldlt().solve(away)) > kChiSquare999);
 }
 
+/// Names the pictures whose corners count much less than those of others.
+void warn_of_blur(const std::vector<Observation>& views, Calibration& result) {
+  constexpr double kMuch = 2;
+  std::string names;
+  int blurred = 0;
+  for (const int i : result.used) {
+    const Observation& view = views[static_cast<std::size_t>(i)];
+    if (!(view.corner_noise > kMuch)) continue;
+    names += (names.empty() ? "" : ", ") + view.image;
+    ++blurred;
+  }
+  if (blurred > 0)
+    result.warnings.push_back("corners scatter more than twice as far as elsewhere in " + names +
+                              ": blurred by the motion? They count as much less");
+}
+
 /// Solves with the poses as the stream has them at the pictures' times, and again at the times found, until
 /// less than a twentieth of a standard deviation is left: velocities then need to hold for no time at all.
-Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
-                             const std::vector<Observation>& views, const CalibrateSettings& settings,
-                             TimeOffset& offset) {
+Calibration calibrate_stream(const Problem& problem, const Dataset& dataset, std::vector<Observation> views,
+                             const CalibrateSettings& settings, TimeOffset& offset) {
   constexpr int kRounds = 6;
   constexpr double kUnknown = 0.1;  // a standard deviation that says nothing [s]
-  std::vector<double> stamps;
-  for (const Frame& frame : dataset.frames) stamps.push_back(frame.stamp);
+  const std::vector<double> stamps = stamps_of(dataset);
   offset.estimate = coarse_offset(problem.setup, *dataset.stream, stamps, views, problem.symmetries);
   CalibrateSettings quick = settings;
   quick.folds = 2;
@@ -132,11 +162,15 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
     if (last) {
       offset.estimate += left.estimate;
       offset.sd *= std::sqrt(result.covariance_factor);  // as the transform's
+      warn_of_blur(views, result);
       for (const std::size_t i : beyond)
         result.selection.views[i].reason = result.views[i].reason =
             "its time lies beyond the poses of " + dataset.poses_path;
       return result;
     }
+    const std::vector<double> ratios = corner_noise_ratios(result.refined.bundle);
+    for (std::size_t k = 0; k < result.used.size(); ++k)
+      views[static_cast<std::size_t>(result.used[k])].corner_noise = ratios[k];
     if (std::abs(left.estimate) < 0.05 * left.sd)
       round = kRounds - 1;  // once more, with everything that the answer holds
     else
@@ -177,11 +211,14 @@ ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Tar
   for (const Frame& frame : dataset.frames)
     if (frame.angles) settings.angles.push_back(*frame.angles);
   if (settings.angles.size() != dataset.frames.size()) settings.angles.clear();
-  const bool timed = settings.refine.bundle.unknowns.time_offsets;
-  if (timed && !dataset.stream)
+  if (settings.clock_offset == ClockOffset::solved && !dataset.stream)
     throw data::InputError(dataset.poses_path +
                            ": found one pose a picture, expected a stream of poses over time, with pictures "
                            "named by their time, to find a time offset");
+  const bool timed = settings.clock_offset == ClockOffset::solved ||
+                     (settings.clock_offset == ClockOffset::where_it_matters && dataset.stream &&
+                      moves_at_pictures(dataset));
+  settings.refine.bundle.unknowns.time_offsets = timed;
   const Problem problem{setup, *dataset.camera, target_points(target), confusable_symmetries(target)};
   const std::vector<RefinerScore> ranking = rank_refiners(detections);
   const auto calibrated = [&](const std::string& refiner) {

@@ -16,6 +16,7 @@ struct Observation {
   Eigen::Matrix2Xd pixels;                         ///< where [px], distorted; pixel centres are whole numbers
   Eigen::Matrix2Xd outward = {};                   ///< of them, see outward_motion(); or none
   std::vector<Eigen::Isometry3d> T_camera_target;  ///< poses that fit, best first: a flat target may have two
+  double corner_noise = 1;                         ///< of its corners, over that of most views
   double pose_rms = 0;                 ///< reprojection of the first of them, 2-D rms per point [px]
   Eigen::Matrix3Xd depth_points = {};  ///< on the target's plane by depth, camera frame [m]; or none
   Eigen::Matrix<double, 6, 1> velocity =

@@ -13,6 +13,7 @@ BundleView make_view(const Eigen::Matrix3Xd& target_points, const Observation& o
   view.points = target_points(Eigen::all, observation.points);
   view.bows = target_bows(target_points)(Eigen::all, observation.points);
   view.pixels = observation.pixels;
+  view.corner_noise = observation.corner_noise;
   view.outward = observation.outward;
   view.depth_points = observation.depth_points;
   return view;

@@ -29,6 +29,7 @@ struct BundleView {
   int pose = 0, camera = 0, target = 0;
   Eigen::Matrix3Xd points;        ///< in the target frame [m]
   Eigen::Matrix2Xd pixels;        ///< where they were seen [px]
+  double corner_noise = 1;        ///< of its corners, over that of the camera's (NoiseLevels::corner)
   Eigen::Matrix2Xd outward = {};  ///< how they move per pixel of the camera's edge offset; none: not at all
   Bows bows;                      ///< how far each point rises per unit of the target's warp (target_bows)
   Eigen::Matrix3Xd depth_points;  ///< on the target's plane, measured by depth, in the camera frame [m]; or

@@ -346,7 +346,7 @@ void add_views(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, co
     double* correction = blocks.corrections[static_cast<std::size_t>(view.pose)].data();
     const auto chain = std::make_shared<ViewChain>(bundle.setup, pose);
     for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
-      problem.AddResidualBlock(new CornerCost(chain, view, i, noise.corner[camera]),
+      problem.AddResidualBlock(new CornerCost(chain, view, i, view.corner_noise * noise.corner[camera]),
                                settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr,
                                blocks.cameras[camera].data(), blocks.bases[arm].data(),
                                blocks.targets[target].data(), correction, blocks.intrinsics[camera].data(),

@@ -255,11 +255,11 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
     if (columns.edge_offsets[camera] >= 0 && view.outward.cols() > 0)
       rows.col(builder.first_shared() + columns.edge_offsets[camera]) = view.outward.col(i);
     rows.col(builder.width() - 1) = residual;
-    const double weight = huber_weight(residual.norm(), sigma, huber);
+    const double weight = huber_weight(residual.norm(), view.corner_noise * sigma, huber);
     gram += weight * rows.transpose() * rows;
     count += 2 * weight;
   }
-  return gram;
+  return gram / (view.corner_noise * view.corner_noise);
 }
 
 LinearModel linearize(const Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings) {

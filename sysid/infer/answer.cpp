@@ -434,7 +434,10 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         weight_of(grid) * scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges).array();
   const MotionLikelihood at_fit =
       likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held);
-  for (std::size_t r = 0; r < replays.size(); ++r) answer.misfits.push_back(at_fit.of_recording(r).misfit());
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    answer.misfits.push_back(at_fit.of_recording(r).misfit());
+    answer.clock_deviations.push_back(at_fit.registration_spread(r)[4]);
+  }
   answer.contradicted = contradicted_stiffnesses(task, answer.values, at_fit, errors_about(there, held));
   answer.residuals = left_residuals(at_fit);
   answer.open_information =

@@ -46,6 +46,7 @@ struct Answer {
   Eigen::VectorXd weights;      ///< of each sample, in the unit of the asset; empty where the weight is known
   Eigen::MatrixXd samples;      ///< of the posterior, values of the axes, a draw a row
   std::vector<Misfit> misfits;  ///< one a recording
+  std::vector<double> clock_deviations;          ///< of the time offset of each recording [s]
   Eigen::VectorXd open_information;              ///< see model_comparison.h
   std::vector<LeftResiduals> residuals;          ///< of `fit`, one a recording
   std::optional<Agreement> agreement;            ///< of several recordings

@@ -204,6 +204,10 @@ double MotionLikelihood::spread_of(std::size_t error) const {
   return spread;
 }
 
+Eigen::Matrix<double, 5, 1> MotionLikelihood::registration_spread(std::size_t r) const {
+  return recordings_[r].bounds.cwiseProduct(recordings_[r].likelihood->free_spread());
+}
+
 double MotionLikelihood::asked_of(std::size_t error) const {
   double sum = 0;
   for (const Recording& recording : recordings_)

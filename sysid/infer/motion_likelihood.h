@@ -48,6 +48,10 @@ class MotionLikelihood {
   /// deviations.
   double spread_of(std::size_t error) const;
 
+  /// How well recording r tells its registration beside the parameters: standard deviations of offset [m],
+  /// yaw [rad] and time [s]. Zero where a bound is.
+  Eigen::Matrix<double, 5, 1> registration_spread(std::size_t r) const;
+
   /// How many standard deviations of a known error the reference asks for, on average over the recordings.
   double asked_of(std::size_t error) const;
 

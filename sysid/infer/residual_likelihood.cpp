@@ -109,15 +109,22 @@ Eigen::MatrixXd ResidualLikelihood::weigh(const Eigen::MatrixXd& columns,
   return (weighed - known * normal.llt().solve(known.transpose() * columns)) / (spread_ * spread_);
 }
 
-Eigen::VectorXd ResidualLikelihood::known_spread() const {
+Eigen::VectorXd ResidualLikelihood::error_variances() const {
   Eigen::MatrixXd all(known_.rows(), known_.cols() + rates_.cols());
   all << known_, rates_;
   Eigen::MatrixXd normal = all.transpose() * weights_.asDiagonal() * all / (spread_ * spread_);
   normal.diagonal().head(priors_.size()) += priors_;
   normal.diagonal().tail(rates_.cols()).array() += kFree;
-  const Eigen::VectorXd variances =
-      normal.llt().solve(Eigen::MatrixXd::Identity(all.cols(), all.cols())).diagonal();
-  return variances.segment(free_, known_.cols() - free_).cwiseSqrt();
+  return normal.llt().solve(Eigen::MatrixXd::Identity(all.cols(), all.cols())).diagonal().head(known_.cols());
+}
+
+Eigen::VectorXd ResidualLikelihood::known_spread() const {
+  return error_variances().tail(known_.cols() - free_).cwiseSqrt();
+}
+
+Eigen::VectorXd ResidualLikelihood::free_spread() const {
+  constexpr double kEven = 1.0 / 3;  // variance of what is even between -1 and 1
+  return error_variances().head(free_).cwiseMin(kEven).cwiseSqrt();
 }
 
 Eigen::VectorXd ResidualLikelihood::curvature_of(const Eigen::VectorXd& left) const {

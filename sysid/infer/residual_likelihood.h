@@ -50,10 +50,15 @@ class ResidualLikelihood {
   /// How well the residuals tell each known error beside the parameters, in its standard deviations.
   Eigen::VectorXd known_spread() const;
 
+  /// The same of each free error, of its bound: at most that of an even distribution between its bounds.
+  Eigen::VectorXd free_spread() const;
+
   /// At the residuals given to the constructor.
   const Misfit& misfit() const { return misfit_; }
 
  private:
+  /// Variances of the errors of known shape, parameters unknown.
+  Eigen::VectorXd error_variances() const;
   /// By how much rho'' / 2 is of each row on average, where `left` is left of rows: 1 below the limit and 0
   /// beyond it, or, where half are beyond, the density of rows about 0 by the nearer half (Powell 1991).
   Eigen::VectorXd curvature_of(const Eigen::VectorXd& left) const;

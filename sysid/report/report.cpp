@@ -93,25 +93,27 @@ Json recordings_of(const Summary& summary) {
     Json frames = Json::array();
     for (const SummaryFrame& frame : recording.frames)
       frames.push_back({{"t", frame.t}, {"score", number(frame.score)}, {"weight", frame.weight}});
-    list.push_back({{"name", recording.name},
-                    {"offset", {recording.offset.x(), recording.offset.y(), recording.offset.z()}},
-                    {"yaw", recording.yaw},
-                    {"time_offset", recording.time_offset},
-                    {"nuisance", recording.nuisance},
-                    {"score", number(recording.score)},
-                    {"noise_m", number(recording.misfit.noise)},
-                    {"misfit_m", number(recording.misfit.size)},
-                    {"explained_m", number(recording.misfit.explained)},
-                    {"fits", model_fits(recording)},
-                    {"markers", recording.markers ? Json{{"miss_m", recording.markers->miss},
-                                                         {"motion_m", recording.markers->motion},
-                                                         {"noise_m", recording.markers->noise}}
-                                                  : Json(nullptr)},
-                    {"keyframes", recording.misfit.keyframes},
-                    {"worth", number(recording.misfit.worth)},
-                    {"horizon_s", optional(recording.horizon_s)},
-                    {"horizon_of", recording.horizon_of},
-                    {"frames", frames}});
+    list.push_back(
+        {{"name", recording.name},
+         {"offset", {recording.offset.x(), recording.offset.y(), recording.offset.z()}},
+         {"yaw", recording.yaw},
+         {"time_offset", recording.time_offset},
+         {"time_offset_sd", recording.time_offset_sd ? Json(*recording.time_offset_sd) : Json(nullptr)},
+         {"nuisance", recording.nuisance},
+         {"score", number(recording.score)},
+         {"noise_m", number(recording.misfit.noise)},
+         {"misfit_m", number(recording.misfit.size)},
+         {"explained_m", number(recording.misfit.explained)},
+         {"fits", model_fits(recording)},
+         {"markers", recording.markers ? Json{{"miss_m", recording.markers->miss},
+                                              {"motion_m", recording.markers->motion},
+                                              {"noise_m", recording.markers->noise}}
+                                       : Json(nullptr)},
+         {"keyframes", recording.misfit.keyframes},
+         {"worth", number(recording.misfit.worth)},
+         {"horizon_s", optional(recording.horizon_s)},
+         {"horizon_of", recording.horizon_of},
+         {"frames", frames}});
   }
   return list;
 }

@@ -61,6 +61,7 @@ Json to_json(const SummaryRecording& recording) {
   json["offset"] = {recording.offset.x(), recording.offset.y(), recording.offset.z()};
   json["yaw"] = recording.yaw;
   json["time_offset"] = recording.time_offset;
+  json["time_offset_sd"] = optional(recording.time_offset_sd);
   json["nuisance"] = recording.nuisance;
   json["score"] = number(recording.score);
   json["score_on_mesh"] = number(recording.score_on_mesh);
@@ -165,7 +166,7 @@ SummaryRecording read_recording(const data::JsonObject& json) {
                       "keyframes",      "keyframes_worth", "markers",      "horizon_s",
                       "frames",         "misfit_draws",    "error_cost",   "spread_m",
                       "score_on_mesh",  "horizon_of",      "mesh",         "own_mesh",
-                      "mesh_sha256"});
+                      "mesh_sha256",    "time_offset_sd"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -175,6 +176,7 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   recording.offset = json.vector("offset", 3);
   recording.yaw = json.number("yaw");
   recording.time_offset = json.number("time_offset");
+  recording.time_offset_sd = json.optional_number("time_offset_sd");
   recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
   recording.score = score_of(json, "score");
   recording.score_on_mesh = score_of(json, "score_on_mesh");

@@ -37,6 +37,7 @@ struct SummaryRecording {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< observed = simulated moved by this [m]
   double yaw = 0;                                    ///< [rad]
   double time_offset = 0;                            ///< [s]
+  std::optional<double> time_offset_sd = {};         ///< its standard deviation; none: not estimated [s]
   std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
   double score = 0;                                  ///< on the mesh that the answer is of [m]
   double score_on_mesh = 0;  ///< on the mesh that was searched; infinite: an earlier program did not say [m]

@@ -155,12 +155,15 @@ HandEyePoses write_rendered_set(const RenderedSetSettings& settings, const std::
   const Target target = parse_target(settings.target);
   const data::CameraIntrinsics camera = make_camera(settings.width, settings.height);
   const Scene scene = make_scene(settings, target, camera, random);
-  const Renderer renderer(target, camera, {.noise = settings.pixel_noise});
+  RenderSettings rendering{.noise = settings.pixel_noise};
+  if (settings.exposure > 0) rendering.samples = 5;  // each moment has places of its own
+  const Renderer renderer(target, camera, rendering);
   const bool stream = settings.motion == RobotMotion::stream;
   data::Trajectory poses;
   for (int i = 0; i < settings.views; ++i) {
     const double stamp = stream ? kStart + 0.5 + kPeriod * i : i;
-    const Eigen::Isometry3d T_base_gripper = scene.gripper(stream ? stamp + settings.time_offset : stamp);
+    const double taken = stream ? stamp + settings.time_offset : stamp;
+    const Eigen::Isometry3d T_base_gripper = scene.gripper(taken);
     const Eigen::Isometry3d C = target_in_camera(settings.setup, scene.truth, T_base_gripper);
     char name[32];
     std::snprintf(name, sizeof name, stream ? "%.3f.png" : "%03.0f.png", stamp);
@@ -168,7 +171,16 @@ HandEyePoses write_rendered_set(const RenderedSetSettings& settings, const std::
       poses.times.push_back(i);
       poses.poses.push_back(reported(T_base_gripper));
     }
-    data::save_png(to_picture(renderer.draw(C, random)), (fs::path(folder) / "images" / name).string());
+    std::vector<Eigen::Isometry3d> exposed{C};
+    if (stream && settings.exposure > 0) {
+      constexpr int kMoments = 12;  // closer than a pixel each
+      exposed.clear();
+      for (int k = 0; k < kMoments; ++k)
+        exposed.push_back(
+            target_in_camera(settings.setup, scene.truth,
+                             scene.gripper(taken + settings.exposure * ((k + 0.5) / kMoments - 0.5))));
+    }
+    data::save_png(to_picture(renderer.draw(exposed, random)), (fs::path(folder) / "images" / name).string());
     if (settings.depth_mm >= 0)
       data::save_depth_image(depth_picture(renderer, camera, C, settings, random),
                              (fs::path(folder) / "depth" / name).string());

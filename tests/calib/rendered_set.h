@@ -26,7 +26,9 @@ struct RenderedSetSettings {
   double pixel_noise = 2;                        ///< of 255
   double depth_mm = -1;     ///< noise of a depth pixel; negative: no depth pictures. Counts are millimetres
   double depth_factor = 1;  ///< what depth says over what is true
-  double time_offset = 0;   ///< pictures are taken that much later than their names say [s]; of a stream
+  double exposure =
+      0;  ///< during which a moving arm blurs a picture, its middle at the time of the picture [s]
+  double time_offset = 0;  ///< pictures are taken that much later than their names say [s]; of a stream
 };
 
 /// Draws the pictures and writes what flash-calib reads: images, depth, poses.tum, camera_info.yaml,

@@ -181,7 +181,7 @@ double Renderer::shade(double x, double y) const {
   return std::hypot(x - column * t.spacing, down - row * t.spacing) < share * t.spacing ? 0 : 1;
 }
 
-GreyImage Renderer::draw(const Eigen::Isometry3d& T_camera_target, std::mt19937& random) const {
+std::vector<double> Renderer::light(const Eigen::Isometry3d& T_camera_target) const {
   // From a ray to the plane z = 0 of the target.
   const Eigen::Isometry3d inverse = T_camera_target.inverse();
   const auto brightness = [&](double x, double y) {
@@ -208,6 +208,21 @@ GreyImage Renderer::draw(const Eigen::Isometry3d& T_camera_target, std::mt19937&
       }
       picture[static_cast<std::size_t>(y * w + x)] = sum;
     }
+  return picture;
+}
+
+GreyImage Renderer::draw(const Eigen::Isometry3d& T_camera_target, std::mt19937& random) const {
+  return draw(std::vector{T_camera_target}, random);
+}
+
+GreyImage Renderer::draw(const std::vector<Eigen::Isometry3d>& T_camera_target, std::mt19937& random) const {
+  const int w = camera_.width, h = camera_.height;
+  std::vector<double> picture(static_cast<std::size_t>(w * h));
+  for (const Eigen::Isometry3d& pose : T_camera_target) {
+    const std::vector<double> each = light(pose);
+    for (std::size_t i = 0; i < picture.size(); ++i)
+      picture[i] += each[i] / static_cast<double>(T_camera_target.size());
+  }
   if (settings_.dots > 0) {
     const std::vector<double> light = dot_pattern(w, h, settings_.dots);
     for (std::size_t i = 0; i < picture.size(); ++i) picture[i] *= light[i];

@@ -29,6 +29,9 @@ class Renderer {
 
   GreyImage draw(const Eigen::Isometry3d& T_camera_target, std::mt19937& random) const;
 
+  /// What falls on the sensor while the target goes through poses that are evenly spaced in time.
+  GreyImage draw(const std::vector<Eigen::Isometry3d>& T_camera_target, std::mt19937& random) const;
+
   /// Depth along the optical axis, of the plane of the target where the print is seen; zero beside it [m].
   std::vector<double> depth(const Eigen::Isometry3d& T_camera_target) const;
 
@@ -36,6 +39,7 @@ class Renderer {
   double shade(double x, double y) const;
 
  private:
+  std::vector<double> light(const Eigen::Isometry3d& T_camera_target) const;  ///< of each pixel, sharp
   double board_shade(double x, double y) const;
   double marker_shade(int index, double u, double v) const;
   Eigen::Vector2d ray(double x, double y) const;

@@ -4,8 +4,8 @@
 //   rendered_dataset neck eye-in-hand chessboard:9x6:0.025 40 640x480 0.02 0.2 1 motion=pan-tilt depth_mm=1
 //   rendered_dataset late eye-in-hand chessboard:9x6:0.025 25 640x480 0.02 0.2 1 motion=stream
 //   time_offset=0.03
-// Names: motion (random, pan-tilt, one-axis, stream), depth_mm, depth_factor, time_offset, pixel_noise, near,
-// far.
+// Names: motion (random, pan-tilt, one-axis, stream), depth_mm, depth_factor, time_offset, exposure,
+// pixel_noise, near, far.
 #include <cstdio>
 #include <iostream>
 #include <string>
@@ -26,6 +26,8 @@ void set(RenderedSetSettings& settings, const std::string& option) {
     settings.depth_mm = std::stod(value);
   else if (name == "depth_factor")
     settings.depth_factor = std::stod(value);
+  else if (name == "exposure")
+    settings.exposure = std::stod(value);
   else if (name == "time_offset")
     settings.time_offset = std::stod(value);
   else if (name == "pixel_noise")

@@ -76,7 +76,7 @@ def parser():
     p.add_argument("--views", metavar="N", type=int, default=0,
                    help="at most N views of handeye, of those where the robot stands still")
     p.add_argument("--every", metavar="SECONDS", type=number(0, 3600),
-                   help="take pictures of a moving arm at least this far apart, with the poses over time, for --time-offset")
+                   help="take pictures of a moving arm at least this far apart, with the poses over time")
     p.add_argument("--from", dest="start", metavar="SECONDS", type=number(0, 1e9),
                    help="leave out what is before, since the first picture")
     p.add_argument("--until", dest="end", metavar="SECONDS", type=number(0, 1e9), help="leave out what is after")

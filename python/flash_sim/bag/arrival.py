@@ -23,4 +23,4 @@ def doubt(delay, other, name, other_name):
     if abs(delay - other) <= LARGEST_DELAY:
         return ""
     return (f"stamps of {name} lie {(delay - other) * 1e-9:+.3f} s farther before their arrival than those of {other_name}: "
-            "do their clocks differ? Synchronise them, or let flash-calib handeye --time-offset tell")
+            "do their clocks differ? Synchronise them, or let flash-calib handeye tell")

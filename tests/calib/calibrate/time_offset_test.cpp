@@ -105,10 +105,10 @@ struct StreamScene {
     dataset.stream = std::move(stream);
   }
 
-  ImageCalibration solved(bool time_offset = true) const {
+  ImageCalibration solved(ClockOffset clock_offset = ClockOffset::where_it_matters) const {
     CalibrateSettings settings;
     settings.folds = 2;
-    settings.refine.bundle.unknowns.time_offsets = time_offset;
+    settings.clock_offset = clock_offset;
     return calibrate_images(Setup::eye_in_hand, dataset, target, detections, std::nullopt, settings);
   }
 };
@@ -143,35 +143,38 @@ TEST(TimeOffset, LargeOnesAreFoundToo) {
 }
 
 TEST(TimeOffset, UnaskedForItIsWarnedOf) {
-  const ImageCalibration late = StreamScene(0.03, 4).solved(false), right = StreamScene(0, 4).solved(false);
+  const ImageCalibration late = StreamScene(0.03, 4).solved(ClockOffset::none),
+                         right = StreamScene(0, 4).solved(ClockOffset::none);
   EXPECT_FALSE(late.time_offset);
   ASSERT_FALSE(late.calibration.warnings.empty());
-  EXPECT_NE(late.calibration.warnings.front().find("--time-offset"), std::string::npos);
+  EXPECT_NE(late.calibration.warnings.front().find("--no-time-offset"), std::string::npos);
   for (const std::string& warning : right.calibration.warnings)
-    EXPECT_EQ(warning.find("--time-offset"), std::string::npos) << warning;
+    EXPECT_EQ(warning.find("--no-time-offset"), std::string::npos) << warning;
 }
 
 // A robot moves by centimetres in a tenth of a second: an answer that leaves it out must not be used, and the
 // robot's noise is no second cause.
 TEST(TimeOffset, ThatTheAnswerDependsOnLeavesNone) {
   const StreamScene scene(0.1, 4);
-  const Calibration late = scene.solved(false).calibration;
+  const Calibration late = scene.solved(ClockOffset::none).calibration;
   EXPECT_FALSE(late.usable);
   int named = 0;
   for (const std::string& warning : late.warnings) {
-    named += warning.find("--time-offset") != std::string::npos;
+    named += warning.find("--no-time-offset") != std::string::npos;
     EXPECT_EQ(warning.find("two tools"), std::string::npos) << warning;
   }
   EXPECT_EQ(named, 1);
-  EXPECT_NE(late.warnings.front().find("--time-offset"), std::string::npos) << late.warnings.front();
+  EXPECT_NE(late.warnings.front().find("--no-time-offset"), std::string::npos) << late.warnings.front();
   EXPECT_TRUE(scene.solved().calibration.usable);
-  EXPECT_TRUE(StreamScene(0, 4).solved(false).calibration.usable);
+  EXPECT_TRUE(StreamScene(0, 4).solved(ClockOffset::none).calibration.usable);
 }
 
 TEST(TimeOffset, IsRefusedWithoutAStreamAndOfARobotAtRest) {
   StreamScene scene(0.03, 5);
   scene.dataset.stream.reset();
-  EXPECT_NE(data::input_error_of([&] { scene.solved(); }).find("expected a stream of poses over time"),
+  EXPECT_NE(data::input_error_of([&] {
+              scene.solved(ClockOffset::solved);
+            }).find("expected a stream of poses over time"),
             std::string::npos);
   // Stands where each picture was taken, and jumps in between.
   StreamScene standing(0, 6);
@@ -181,7 +184,9 @@ TEST(TimeOffset, IsRefusedWithoutAStreamAndOfARobotAtRest) {
         static_cast<std::size_t>(std::clamp(std::lround((stream.times[k] - 0.6) / 0.43), 0L, 24L));
     stream.poses[k] = standing.dataset.frames[nearest].T_base_gripper;
   }
-  EXPECT_NE(data::input_error_of([&] { standing.solved(); }).find("stands still at every picture"),
+  EXPECT_NE(data::input_error_of([&] {
+              standing.solved(ClockOffset::solved);
+            }).find("stands still at every picture"),
             std::string::npos);
 }
 
@@ -197,10 +202,8 @@ TEST(TimeOffset, OfARenderedStreamIsFound) {
   const HandEyePoses truth = write_rendered_set(settings, folder / "stream");
   const Dataset dataset = load_dataset(folder / "stream");
   const Target target = parse_target(dataset.target);
-  CalibrateSettings solving;
-  solving.refine.bundle.unknowns.time_offsets = true;
   const ImageCalibration result =
-      calibrate_images(*dataset.setup, dataset, target, detect(dataset, target), std::nullopt, solving);
+      calibrate_images(*dataset.setup, dataset, target, detect(dataset, target), std::nullopt);
   ASSERT_TRUE(result.time_offset);
   const Vector6d error = motion_between(result.calibration.poses.X, truth.X);
   std::printf("offset %.2f +- %.2f ms; off by %.3f mm\n", 1e3 * result.time_offset->estimate,

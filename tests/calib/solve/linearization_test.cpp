@@ -29,6 +29,7 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
   bundle.warps = {Warp(0.004, -0.003, 0.002)};
   bundle.views[0].outward = Eigen::Matrix2Xd::Random(2, scene.points.cols());
   bundle.edge_offsets = {0.3};
+  bundle.views[0].corner_noise = 2;
   const Unknowns unknowns{.corrections = true,
                           .intrinsics = kIntrinsics,
                           .scales = true,
@@ -60,7 +61,7 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
       b.warps[0][shared - columns.warps[0]] += step;
     if (shared == columns.edge_offsets[0]) b.edge_offsets[0] += step;
     if (shared == columns.time_offsets[1]) b.time_offsets[1] += step;
-    const Eigen::Matrix2Xd r = -residuals(b, b.views[0]);
+    const Eigen::Matrix2Xd r = -residuals(b, b.views[0]) / b.views[0].corner_noise;
     return Eigen::VectorXd(r.reshaped());
   };
   Eigen::MatrixXd J(2 * scene.points.cols(), width + 1);

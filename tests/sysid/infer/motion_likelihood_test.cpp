@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "sysid/emulate/two_mesh_motions.h"
 #include "tests/sysid/moving_sheet.h"
@@ -90,6 +91,38 @@ TEST(MotionLikelihood, AnErrorOfKnownShapeIsTakenOutHoweverLarge) {
   // One and a half standard deviations are to be paid for, and next to nothing of them is left open.
   EXPECT_NEAR(likelihood.deviance({cloth.bulged(0)}), 1.5 * 1.5, 0.1);
   EXPECT_LT(likelihood.spread_of(0), 0.01);
+}
+
+// A sheet that moves at a known speed everywhere tells its clock as a mean of its rows tells a height.
+TEST(MotionLikelihood, TellsItsClockAsItsSpeedAndNoiseDo) {
+  constexpr double kSpeed = 0.1, kNoise = 5e-4;  // of all points, along the normal [m/s, m]
+  Cloth cloth(12);
+  Motion rising{.start = -0.1, .step = 0.1, .positions = {}};
+  for (int k = 0; k < 12; ++k) {
+    rising.positions.push_back(cloth.replay.surface.vertices);
+    rising.positions.back().col(2).array() += kSpeed * (rising.start + k * rising.step);
+  }
+  cloth.see(rising);
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal(0, kNoise);
+  for (Observation& observation : cloth.replay.observations)
+    for (Eigen::Index i = 0; i < observation.points.rows(); ++i) observation.points(i, 2) += normal(random);
+  cloth.replay.recording.nuisance.offset.setZero();
+  cloth.replay.recording.nuisance.yaw = 0;
+  ScoreSettings settings;
+  settings.objective.robust.kind = RobustKind::plain;
+  const auto with_bound = [&](double bound) {
+    cloth.replay.recording.nuisance.time = bound;
+    return MotionLikelihood({cloth.replay}, result_of(rising), settings, {}, {}, {});
+  };
+  // A mean of as many rows as it takes; what two thousand of them say of their noise is known to 2 %.
+  const MotionLikelihood likelihood = with_bound(0.05);
+  const double rows = static_cast<double>(likelihood.of_recording(0).rows());
+  const double expected = kNoise / (kSpeed * std::sqrt(rows));
+  EXPECT_NEAR(likelihood.registration_spread(0)[4], expected, 0.06 * expected);
+  EXPECT_EQ(likelihood.registration_spread(0)[0], 0);
+  // What a bound leaves is told by the bound alone.
+  EXPECT_NEAR(with_bound(1e-6).registration_spread(0)[4], 1e-6 / std::sqrt(3), 1e-9);
 }
 
 TEST(MotionLikelihood, IsTheSameOnAnyThreads) {
