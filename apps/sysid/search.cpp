@@ -92,11 +92,11 @@ std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecord
 /// "12 +- 3": how much later observations were made than their times say [ms].
 std::string clock_text(const sysid::SummaryRecording& recording) {
   char text[48];
-  std::snprintf(text, sizeof text, "%.0f", 1000 * recording.time_offset);
-  if (!recording.time_offset_sd || *recording.time_offset_sd == 0) return text;
-  const double sd = 1000 * *recording.time_offset_sd;
-  std::snprintf(text, sizeof text, sd < 1 ? "%.1f +- %.1f" : "%.0f +- %.0f", 1000 * recording.time_offset,
-                sd);
+  if (recording.clock && recording.clock->sd > 0)
+    std::snprintf(text, sizeof text, recording.clock->sd < 1e-3 ? "%.1f +- %.1f" : "%.0f +- %.0f",
+                  1000 * recording.clock->estimate, 1000 * recording.clock->sd);
+  else
+    std::snprintf(text, sizeof text, "%.0f", 1000 * recording.time_offset);
   return text;
 }
 

@@ -436,7 +436,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
       likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held);
   for (std::size_t r = 0; r < replays.size(); ++r) {
     answer.misfits.push_back(at_fit.of_recording(r).misfit());
-    answer.clock_deviations.push_back(at_fit.registration_spread(r)[4]);
+    answer.clocks.push_back({at_fit.registration(r)[4], at_fit.registration_spread(r)[4]});
   }
   answer.contradicted = contradicted_stiffnesses(task, answer.values, at_fit, errors_about(there, held));
   answer.residuals = left_residuals(at_fit);

@@ -7,6 +7,7 @@
 #include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/agreement.h"
 #include "sysid/infer/answer_work.h"
+#include "sysid/infer/clock_offset.h"
 #include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
 #include "sysid/infer/model_comparison.h"
@@ -46,7 +47,7 @@ struct Answer {
   Eigen::VectorXd weights;      ///< of each sample, in the unit of the asset; empty where the weight is known
   Eigen::MatrixXd samples;      ///< of the posterior, values of the axes, a draw a row
   std::vector<Misfit> misfits;  ///< one a recording
-  std::vector<double> clock_deviations;          ///< of the time offset of each recording [s]
+  std::vector<ClockOffset> clocks;               ///< one a recording
   Eigen::VectorXd open_information;              ///< see model_comparison.h
   std::vector<LeftResiduals> residuals;          ///< of `fit`, one a recording
   std::optional<Agreement> agreement;            ///< of several recordings

@@ -48,8 +48,13 @@ class MotionLikelihood {
   /// deviations.
   double spread_of(std::size_t error) const;
 
-  /// How well recording r tells its registration beside the parameters: standard deviations of offset [m],
-  /// yaw [rad] and time [s]. Zero where a bound is.
+  /// The registration of recording r at the reference, offset [m], yaw [rad] and time [s], known errors
+  /// fitted beside it.
+  const Eigen::Matrix<double, 5, 1>& registration(std::size_t r) const {
+    return recordings_[r].nuisance.registration;
+  }
+
+  /// How well recording r tells it beside the parameters: standard deviations. Zero where a bound is.
   Eigen::Matrix<double, 5, 1> registration_spread(std::size_t r) const;
 
   /// How many standard deviations of a known error the reference asks for, on average over the recordings.

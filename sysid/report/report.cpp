@@ -98,7 +98,7 @@ Json recordings_of(const Summary& summary) {
          {"offset", {recording.offset.x(), recording.offset.y(), recording.offset.z()}},
          {"yaw", recording.yaw},
          {"time_offset", recording.time_offset},
-         {"time_offset_sd", recording.time_offset_sd ? Json(*recording.time_offset_sd) : Json(nullptr)},
+         {"clock", recording.clock ? Json{recording.clock->estimate, recording.clock->sd} : Json(nullptr)},
          {"nuisance", recording.nuisance},
          {"score", number(recording.score)},
          {"noise_m", number(recording.misfit.noise)},

@@ -61,7 +61,9 @@ Json to_json(const SummaryRecording& recording) {
   json["offset"] = {recording.offset.x(), recording.offset.y(), recording.offset.z()};
   json["yaw"] = recording.yaw;
   json["time_offset"] = recording.time_offset;
-  json["time_offset_sd"] = optional(recording.time_offset_sd);
+  json["clock"] = recording.clock
+                      ? Json{{"estimate_s", recording.clock->estimate}, {"sd_s", recording.clock->sd}}
+                      : Json(nullptr);
   json["nuisance"] = recording.nuisance;
   json["score"] = number(recording.score);
   json["score_on_mesh"] = number(recording.score_on_mesh);
@@ -159,14 +161,21 @@ ParameterFinding read_finding(const std::string& name, const data::JsonObject& j
 }
 
 SummaryRecording read_recording(const data::JsonObject& json) {
-  json.expect_fields({"name",           "sha256",          "offset",       "yaw",
-                      "time_offset",    "nuisance",        "score",        "noise_m",
-                      "rough_m",        "misfit_m",        "misfit_rms_m", "misfit_explained_m",
-                      "misfit_reach_s", "misfit_reach_m",  "misfit_gain",  "model_fits",
-                      "keyframes",      "keyframes_worth", "markers",      "horizon_s",
-                      "frames",         "misfit_draws",    "error_cost",   "spread_m",
-                      "score_on_mesh",  "horizon_of",      "mesh",         "own_mesh",
-                      "mesh_sha256",    "time_offset_sd"});
+  json.expect_fields({"name",           "sha256",
+                      "offset",         "yaw",
+                      "time_offset",    "nuisance",
+                      "score",          "noise_m",
+                      "rough_m",        "misfit_m",
+                      "misfit_rms_m",   "misfit_explained_m",
+                      "misfit_reach_s", "misfit_reach_m",
+                      "misfit_gain",    "model_fits",
+                      "keyframes",      "keyframes_worth",
+                      "markers",        "horizon_s",
+                      "frames",         "misfit_draws",
+                      "error_cost",     "spread_m",
+                      "score_on_mesh",  "horizon_of",
+                      "mesh",           "own_mesh",
+                      "mesh_sha256",    "clock"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -176,7 +185,11 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   recording.offset = json.vector("offset", 3);
   recording.yaw = json.number("yaw");
   recording.time_offset = json.number("time_offset");
-  recording.time_offset_sd = json.optional_number("time_offset_sd");
+  if (json.has("clock") && !json.raw("clock").is_null()) {
+    const data::JsonObject clock = json.object("clock");
+    clock.expect_fields({"estimate_s", "sd_s"});
+    recording.clock = {clock.number("estimate_s"), clock.number("sd_s")};
+  }
   recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
   recording.score = score_of(json, "score");
   recording.score_on_mesh = score_of(json, "score_on_mesh");

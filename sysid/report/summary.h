@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sysid/infer/agreement.h"
+#include "sysid/infer/clock_offset.h"
 #include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
 #include "sysid/infer/marker_fit.h"
@@ -37,7 +38,7 @@ struct SummaryRecording {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< observed = simulated moved by this [m]
   double yaw = 0;                                    ///< [rad]
   double time_offset = 0;                            ///< [s]
-  std::optional<double> time_offset_sd = {};         ///< its standard deviation; none: not estimated [s]
+  std::optional<ClockOffset> clock = {};             ///< none: not estimated
   std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
   double score = 0;                                  ///< on the mesh that the answer is of [m]
   double score_on_mesh = 0;  ///< on the mesh that was searched; infinite: an earlier program did not say [m]

@@ -5,11 +5,15 @@ import argparse
 import json
 import pathlib
 import re
+import subprocess
 import sys
+import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LOADERS = {"flash-recording-1.json": ("data/recording/recording.cpp", "data/recording/recording_markers.cpp"),
-           "flash-asset-1.json": ("data/asset/asset.cpp",)}
+           "flash-asset-1.json": ("data/asset/asset.cpp",),
+           "flash-scene-1.json": ("data/scene/scene.cpp", "data/scene/scene_solver.cpp")}
+PUBLISHED = {"timestep", "gravity", "linearsolver", "constraintsolver", "planecollisions", "objects"}  # a scene without a schema
 
 
 def fields_of(schema):
@@ -34,9 +38,27 @@ def spoilt(value, schema):
         yield "shcema", {**value, "shcema": 1}
 
 
+def write_cell(calib, folder):
+    """What register makes of two arms on one camera."""
+    still = {"translation": [0, 0, 1], "rotation_xyzw": [1, 0, 0, 0]}
+    for name in ("left", "right"):
+        (folder / f"{name}.json").write_text(json.dumps(
+            {"schema": "flash-extrinsics/2", "setup": "eye-to-hand", "method": "errors_in_variables",
+             "transform": still | {"parent": "base", "child": "camera"}, "target_pose": still | {"parent": "gripper", "child": "target"},
+             "covariance": [[1e-6 if i == j else 0 for j in range(6)] for i in range(6)]}))
+    subprocess.run([calib, "register", folder / "left.json", folder / "right.json", "--without-images", "--workspace", "0.4,0,0.1",
+                    "--quiet", "-o", folder / "cell.json"], check=True, stdout=subprocess.DEVNULL)
+
+
 def main():
+    with tempfile.TemporaryDirectory() as folder:
+        check(pathlib.Path(folder))
+
+
+def check(own):
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folders", nargs="*", type=pathlib.Path, help="searched for JSON of the programs")
+    parser.add_argument("--calib", help="flash-calib, for a cell")
     options = parser.parse_args()
     try:
         import jsonschema
@@ -52,9 +74,11 @@ def main():
         for source in LOADERS.get(name, ()):
             for known in re.findall(r"expect_fields\(\{(.*?)\}\)", (ROOT / source).read_text(), re.DOTALL):
                 names = set(re.findall(r'"([^"]+)"', known)) - {"bending"}  # of the published format
-                if names not in list(fields_of(schema)):
+                if names != PUBLISHED and names not in [fields - {"shape"} for fields in fields_of(schema)] + list(fields_of(schema)):
                     wrong.append(f"docs/schemas/{name}: no object has the fields {sorted(names)} of {source}")
-    for path in [path for folder in [ROOT / "examples/assets", *options.folders] for path in sorted(folder.rglob("*.json"))]:
+    if options.calib:
+        write_cell(options.calib, own)
+    for path in [path for folder in [ROOT / "examples", own, *options.folders] for path in sorted(folder.rglob("*.json"))]:
         value = json.loads(path.read_text())
         named = value.get("schema", "") if isinstance(value, dict) else ""
         name = named.replace("/", "-") + ".json"

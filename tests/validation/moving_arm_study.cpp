@@ -26,9 +26,9 @@ constexpr double kChiSquare95 = 12.592;  // six degrees of freedom
 
 struct Tally {
   int runs = 0, found = 0, near = 0, inside = 0, offset_inside = 0;
-  double squares = 0;        // of the offset's error over its deviation
-  double worst = 0;          // offset [s]
-  double millimetres = 0;    // error of X, squared
+  double squares = 0;      // of the offset's error over its deviation
+  double worst = 0;        // offset [s]
+  double millimetres = 0;  // error of X, squared
 };
 
 /// What one recording says; false where nothing was determined.
@@ -64,9 +64,11 @@ void run(Setup setup, double exposure, unsigned seed, Tally& tally) {
     tally.squares += error * error / (sd * sd);
     tally.worst = std::max(tally.worst, std::abs(error));
     tally.millimetres += 1e6 * away.head<3>().squaredNorm();
-    std::printf("  seed %u: %zu views, %+.2f +- %.2f ms, X off by %.2f mm, %.3f deg, chi-square %.1f, corners %.3f px\n",
-                seed, found.used.size(), 1e3 * error, 1e3 * sd, 1e3 * away.head<3>().norm(),
-                away.tail<3>().norm() * 180 / M_PI, chi_square, found.corner_rms);
+    std::printf(
+        "  seed %u: %zu views, %+.2f +- %.2f ms, X off by %.2f mm, %.3f deg, chi-square %.1f, corners %.3f "
+        "px\n",
+        seed, found.used.size(), 1e3 * error, 1e3 * sd, 1e3 * away.head<3>().norm(),
+        away.tail<3>().norm() * 180 / M_PI, chi_square, found.corner_rms);
     for (const std::string& warning : found.warnings) std::printf("    %s\n", warning.c_str());
   } catch (const data::InputError& refusal) {
     std::printf("  seed %u: %s\n", seed, refusal.what());
@@ -83,16 +85,18 @@ int main(int argc, char** argv) {
   const int runs = argc > 1 ? std::atoi(argv[1]) : 10;
   const unsigned first = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 6000001;
   std::map<std::pair<double, Setup>, Tally> tallies;
-  for (const double exposure : {0.0, 0.01, 0.02})
+  for (const double exposure : {0.0, 0.02, 0.06})
     for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand}) {
       std::printf("%s, exposure %.0f ms\n", to_string(setup), 1e3 * exposure);
       for (int k = 0; k < runs; ++k)
         run(setup, exposure, first + static_cast<unsigned>(k), tallies[{exposure, setup}]);
     }
-  std::printf("\n| exposure [ms] | setup | found | offset to 2 ms | offset inside 95 %% | X inside 95 %% | worst offset [ms] | X off, rms [mm] |\n"
-              "|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n| exposure [ms] | setup | found | offset to 2 ms | offset inside 95 %% | X inside 95 %% | worst "
+      "offset [ms] | X off, rms [mm] |\n"
+      "|---|---|---|---|---|---|---|---|\n");
   for (const auto& [key, tally] : tallies)
-    std::printf("| %.0f | %s | %d of %d | %d | %d | %d | %.2f | %.2f |\n", 1e3 * key.first, to_string(key.second),
-                tally.found, tally.runs, tally.near, tally.offset_inside, tally.inside, 1e3 * tally.worst,
-                std::sqrt(tally.millimetres / std::max(1, tally.found)));
+    std::printf("| %.0f | %s | %d of %d | %d | %d | %d | %.2f | %.2f |\n", 1e3 * key.first,
+                to_string(key.second), tally.found, tally.runs, tally.near, tally.offset_inside, tally.inside,
+                1e3 * tally.worst, std::sqrt(tally.millimetres / std::max(1, tally.found)));
 }

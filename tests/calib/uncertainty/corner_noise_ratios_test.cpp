@@ -10,8 +10,8 @@
 namespace flash::calib {
 namespace {
 
-/// Twenty-four views by a robot that reports its poses to a micrometre, corners of every third `blur` times as
-/// noisy.
+/// Twenty-four views by a robot that reports its poses to a micrometre, corners of every third `blur` times
+/// as noisy.
 HandEyeScene blurred_scene(double blur, unsigned seed) {
   SceneSettings settings{.views = 24};
   settings.robot_mm = 0.001;
@@ -25,7 +25,8 @@ HandEyeScene blurred_scene(double blur, unsigned seed) {
 }
 
 Refinement refined(const HandEyeScene& scene, const std::vector<double>& ratios) {
-  Bundle bundle = make_bundle(scene.settings.setup, scene.camera, scene.points, scene.observations, scene.truth);
+  Bundle bundle =
+      make_bundle(scene.settings.setup, scene.camera, scene.points, scene.observations, scene.truth);
   for (std::size_t i = 0; i < ratios.size(); ++i) bundle.views[i].corner_noise = ratios[i];
   return refine(std::move(bundle), {});
 }
@@ -42,7 +43,8 @@ TEST(CornerNoiseRatios, TellWhichViewsAreBlurred) {
     const std::vector<double> ratios = corner_noise_ratios(refined(blurred_scene(4, seed), {}).bundle);
     double blurred = 0, sharp = 0;
     for (std::size_t i = 0; i < ratios.size(); ++i) (i % 3 == 0 ? blurred : sharp) += std::log(ratios[i]);
-    // Of 8 and 16 views: their mean logarithms to 7 % over the root of their number, drawn in by some percent.
+    // Of 8 and 16 views: their mean logarithms to 7 % over the root of their number, drawn in by some
+    // percent.
     EXPECT_NEAR(std::exp(blurred / 8 - sharp / 16), 4, 0.5);
   }
 }
@@ -62,10 +64,11 @@ TEST(CornerNoiseRatios, BlurredViewsThatCountLessBringTheCameraNearer) {
     stated_alike += first.covariance.topLeftCorner<3, 3>().trace();
     stated += second.covariance.topLeftCorner<3, 3>().trace();
   }
-  std::printf("X off by %.3f mm where all views count alike (stated %.3f), %.3f where blurred ones count less "
-              "(stated %.3f)\n",
-              1e3 * std::sqrt(alike / kSeeds), 1e3 * std::sqrt(stated_alike / kSeeds),
-              1e3 * std::sqrt(weighed / kSeeds), 1e3 * std::sqrt(stated / kSeeds));
+  std::printf(
+      "X off by %.3f mm where all views count alike (stated %.3f), %.3f where blurred ones count less "
+      "(stated %.3f)\n",
+      1e3 * std::sqrt(alike / kSeeds), 1e3 * std::sqrt(stated_alike / kSeeds),
+      1e3 * std::sqrt(weighed / kSeeds), 1e3 * std::sqrt(stated / kSeeds));
   EXPECT_LT(weighed, 0.5 * alike);
   // 60 numbers: their mean square to 18 %.
   EXPECT_NEAR(weighed / stated, 1, 0.4);
