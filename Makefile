@@ -23,7 +23,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
-.PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
+.PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
 .PHONY: cell pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
 
@@ -141,6 +141,10 @@ moving-arm-study: configure-test  ## Say whether hand-eye calibration finds the 
 kinhec: configure-test  ## Say how pairs of the public benchmark KinHEC (pip install kinhec) are answered beside its own methods
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib
 	$(PYTHON) tests/validation/kinhec.py --calib $(BUILD)/bin/flash-calib --size-known --out $(BUILD)/kinhec
+
+same-answers: configure  ## Say that orders, ranges, units and where a scene stands change no answer
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/robustness/same_answers.py --sysid $(BUILD)/bin/flash-sysid
 
 ridge-study: configure-test  ## Say whether posteriors on ridges, straight and bent, of 2 to 6 parameters are right, over 200 draws each
 	cmake --build $(BUILD) -j $(JOBS) --target ridge_study

@@ -36,10 +36,10 @@ def rotation_of(q):
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
 
 
-def synthesize(sysid, folder, *options):
+def synthesize(sysid, folder, *options, seed=1, mesh=ASSET["mesh"], duration=0.6):
     """An asset and a recording of it, a short corner lift."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "asset.json").write_text(json.dumps(ASSET, indent=1))
-    must(sysid, "synth", "--asset", folder / "asset.json", "--kind", "corner_lift", "--mesh", "sheet:0.2x0.2:0.05:alternating",
-         "--duration", "0.6", "--seed", "1", "--quiet", *options, "-o", folder / "recording")
+    must(sysid, "synth", "--asset", folder / "asset.json", "--kind", "corner_lift", "--mesh", mesh, "--duration", duration,
+         "--seed", seed, "--quiet", *options, "-o", folder / "recording")
     return folder / "asset.json", folder / "recording"
