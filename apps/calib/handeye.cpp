@@ -41,6 +41,7 @@ struct HandEyeOptions {
   LensOption lens;
   std::optional<double> target_size_sd = {};
   bool size_as_stated = false;
+  std::string camera_height, target_height;  ///< "0.35" or "0.35:0.002" [m]
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2, camera_info;
   std::string out, report;
@@ -51,6 +52,35 @@ calib::Setup setup_of(const HandEyeOptions& options, const calib::Dataset& datas
   if (dataset.setup) return *dataset.setup;
   throw data::InputError(dataset.source +
                          ": says nothing of the setup; add --setup eye-in-hand or eye-to-hand");
+}
+
+/// METRES or METRES:DEVIATION, of camera or target; none where neither is given.
+std::optional<calib::MeasuredHeight> measured_height(const HandEyeOptions& options) {
+  if (options.camera_height.empty() && options.target_height.empty()) return std::nullopt;
+  if (!options.camera_height.empty() && !options.target_height.empty())
+    throw data::InputError("--camera-height, --target-height: found both, expected one");
+  calib::MeasuredHeight measured{.target = options.camera_height.empty()};
+  const std::string& text = measured.target ? options.target_height : options.camera_height;
+  const std::size_t colon = text.find(':');
+  const auto number = [](const std::string& part, double& value) {
+    return CLI::detail::lexical_cast(part, value) && std::abs(value) < 100;
+  };
+  if (!number(text.substr(0, colon), measured.height) ||
+      (colon != std::string::npos && !(number(text.substr(colon + 1), measured.sd) && measured.sd > 0)))
+    throw data::InputError(std::string(measured.target ? "--target-height" : "--camera-height") + ": found " +
+                           text + ", expected metres, and their standard deviation, as 0.35:0.002");
+  return measured;
+}
+
+/// What other programs read has no words for a number that is not told.
+void expect_whole(const HandEyeOptions& options, const calib::Calibration& calibration) {
+  if (!calibration.along || calibration.along->told) return;
+  for (const auto& [name, path] : {std::pair{"--ros", &options.ros},
+                                   {"--urdf", &options.urdf},
+                                   {"--easy-handeye2", &options.easy_handeye2}})
+    if (!path->empty())
+      throw data::InputError(std::string(name) + ": " +
+                             calib::untold_sentence(*calibration.along, calibration.setup));
 }
 
 /// Beside the extrinsics, unless it has a name of its own; empty: none.
@@ -107,9 +137,12 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   std::printf("%s <- %s: (%.5f, %.5f, %.5f) m; deviations along and about the axes of %s:\n", parent,
               extrinsics.transform.child.c_str(), t.x(), t.y(), t.z(), parent);
   const auto deviations = [&](const char* what, const calib::Matrix6d& covariance) {
-    const calib::Vector6d sd = calib::parent_deviations(c.poses.X, covariance);
-    std::printf("  %-28s +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n", what, 1e3 * sd[0], 1e3 * sd[1],
-                1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
+    const calib::ToldDeviations sd = calib::told_deviations(c, covariance, calib::Axes::parent);
+    const auto text = [&](std::size_t i) {
+      return !sd[i] ? "not told" : i < 3 ? fixed(1e3 * *sd[i], 2) : fixed(kDegrees * *sd[i], 3);
+    };
+    std::printf("  %-28s +- (%s, %s, %s) mm, (%s, %s, %s) deg\n", what, text(0).c_str(), text(1).c_str(),
+                text(2).c_str(), text(3).c_str(), text(4).c_str(), text(5).c_str());
   };
   deviations(extrinsics.pixels ? "in the true frames" : "by scatter alone", c.covariance);
   if (extrinsics.pixels) deviations("repeatable in such poses", c.repeatable);
@@ -249,10 +282,12 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   settings.closed_forms = calib::opencv_closed_forms();
   settings.target_size_sd = options.target_size_sd;
   settings.size_as_stated = options.size_as_stated;
+  settings.height = measured_height(options);
   settings.threads = options.common.threads;
   settings.clock_offset = options.clock_offset;
   const calib::ImageCalibration solved = solve(options, setup, dataset, settings, phases);
 
+  expect_whole(options, solved.calibration);
   const calib::ExtrinsicsInputs inputs = calib::relative_to(
       {dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
        dataset.poses_path, dataset.camera_path, solved.refiner, solved.depth, solved.time_offset,
@@ -315,6 +350,15 @@ void add_handeye_verb(CLI::App& app, Action& action) {
       ->default_str("workspace");
   add_lens_option(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd, options->size_as_stated);
+  verb->add_option(
+      "--camera-height", options->camera_height,
+      "Of a robot that turns about one axis alone, as a four-axis arm: where the camera is along that "
+      "axis, in the base (eye-to-hand) or the gripper, and a standard deviation of 1 mm or as stated, "
+      "as 0.35:0.002 [m]");
+  verb->add_option(
+      "--target-height", options->target_height,
+      "In its place, where the target's origin is along that axis, in the base (eye-in-hand) or the "
+      "gripper");
   verb->add_flag_function(
       "--time-offset,!--no-time-offset",
       [options](std::int64_t asked) {

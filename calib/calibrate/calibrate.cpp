@@ -32,15 +32,6 @@ std::vector<Eigen::Isometry3d> target_poses(const std::vector<Observation>& obse
   return poses;
 }
 
-/// Of the target.
-double usual_distance(const std::vector<Observation>& observations) {
-  std::vector<double> distances;
-  distances.reserve(observations.size());
-  for (const Observation& o : observations)
-    distances.push_back(o.T_camera_target.front().translation().norm());
-  return data::median(distances);
-}
-
 /// left_out: the views that were, with their reasons; one is named.
 void expect_enough(std::size_t used, std::size_t all, int least, const std::string& left_out = {}) {
   if (used >= static_cast<std::size_t>(least)) return;
@@ -154,12 +145,37 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
     Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
     plain.priors = priors_of(camera, points, settings);
     plain.scales = {result.size_begun};
+    if (const std::optional<OneAxis> axis = axis_of(result.setup, observations, settings))
+      plain.priors.along = loose_along(*axis, seed, usual_distance(observations));
     result.refined = refine(plain, refine_settings);
     const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
     if (dropping && !few && drop_worst(result, observations, settings.surprise)) continue;
     dropping = false;
     if (!readmit(result, observations, points, refine_settings.bundle)) return plain;
   }
+}
+
+/// Of a robot that turns about one axis: a place along it that turns do not tell is held from here on.
+void settle_place(Calibration& result, const std::vector<Observation>& observations, Bundle& plain,
+                  const RefineSettings& refine_settings, const CalibrateSettings& settings) {
+  const std::optional<OneAxis> axis = axis_of(result.setup, observations, settings);
+  if (!axis) return;
+  Bundle& bundle = result.refined.bundle;
+  const double distance = usual_distance(observations);
+  // The robot's errors may turn about any place between gripper and target.
+  const SettledPlace settled =
+      settle_along(*axis, {bundle.cameras.front(), bundle.targets.front()},
+                   result.refined.covariance.topLeftCorner<6, 6>(), result.refined.noise.rotation.front(),
+                   0.5 * distance, distance, settings.height);
+  result.along = settled.place;
+  if (!settled.hold) return;
+  for (Bundle* held : {&plain, &bundle}) {
+    const HandEyePoses poses = moved_to(*settled.hold, *axis, {held->cameras.front(), held->targets.front()});
+    held->cameras.front() = poses.X;
+    held->targets.front() = poses.Z;
+    held->priors.along = settled.hold;
+  }
+  result.refined = refine(std::move(bundle), refine_settings);
 }
 
 /// Where an answer is none although most views close: the reading that explains them, if there is one.
@@ -265,7 +281,7 @@ void warn(Calibration& result) {
         " views: noise levels and uncertainty are themselves uncertain; 15 or more are better");
   constexpr double kWideTurn = 10;  // [deg]
   const double second = result.diversity.spread.y() / kDegree;
-  if (second < kWideTurn) {
+  if (second < kWideTurn && !(result.along && !result.along->told)) {
     char text[240];
     std::snprintf(
         text, sizeof text,
@@ -327,6 +343,35 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
   return observations;
 }
 
+double usual_distance(const std::vector<Observation>& observations) {
+  std::vector<double> distances;
+  distances.reserve(observations.size());
+  for (const Observation& o : observations)
+    distances.push_back(o.T_camera_target.front().translation().norm());
+  return data::median(distances);
+}
+
+std::optional<OneAxis> axis_of(Setup setup, const std::vector<Observation>& used,
+                               const CalibrateSettings& settings) {
+  std::vector<Eigen::Isometry3d> robot;
+  robot.reserve(used.size());
+  for (const Observation& observation : used) robot.push_back(observation.T_base_gripper);
+  std::optional<OneAxis> axis = one_axis(setup, robot);
+  if (!axis && settings.height)
+    throw data::InputError(
+        std::string(settings.height->target ? "--target-height" : "--camera-height") +
+        ": the robot turns about more than one axis, which tells that height: leave it out");
+  return axis;
+}
+
+void state_along(Calibration& result) {
+  if (!result.along) return;
+  const Matrix6d along = covariance_along(*result.along, result.poses.X);
+  result.covariance += along;
+  result.repeatable += along;
+  if (!result.along->told) tell_first(result, untold_sentence(*result.along, result.setup));
+}
+
 void restore_size(Calibration& result) {
   if (result.size_begun != 1) resize(result.selection.observations, 1 / result.size_begun);
 }
@@ -365,6 +410,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
   const std::string noisy = implausible_noise(result.refined.noise, observations);
   if (!noisy.empty()) throw data::InputError(cause_of(result, all, symmetries, settings).value_or(noisy));
+  settle_place(result, observations, plain, refine_settings, settings);
   SizedRefinement sized = refine_sizes(std::move(result.refined), refine_settings, result.size_begun);
   result.refined = std::move(sized.refined);
   result.size = sized.sizes.front();
@@ -379,7 +425,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
 
   const Bundle& bundle = result.refined.bundle;
   std::optional<PixelFit> pixels;
-  if (settings.use == Use::image && !result.unknowns.joint_zeros)
+  if (settings.use == Use::image && !result.unknowns.joint_zeros && !result.along)
     pixels = fit_pixels(result.refined, refine_settings.bundle,
                         fit_pose_errors(result.refined, refine_settings.bundle));
   compare_methods(result, observations, plain, pixels, refine_settings, settings);
@@ -419,6 +465,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   if (!plausible)
     if (const auto cause = cause_of(result, all, symmetries, settings)) tell_first(result, *cause, true);
   restore_size(result);
+  state_along(result);
   return result;
 }
 

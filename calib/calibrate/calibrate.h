@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calib/calibrate/method_comparison.h"
+#include "calib/calibrate/place_along.h"
 #include "calib/calibrate/use.h"
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/convention_check.h"
@@ -44,6 +45,8 @@ struct CalibrateSettings {
   LensKnowledge lens = LensKnowledge::near;
   LensCovariance lens_covariance = LensCovariance::Zero();   ///< as it was stated; zero: nothing was
   ClockOffset clock_offset = ClockOffset::where_it_matters;  ///< of pictures (calibrate_images())
+  /// Of camera or target along the axis that the robot turns about, where it turns about one alone.
+  std::optional<MeasuredHeight> height = {};
   bool motions = true;  ///< of camera and target are looked for; else both are taken to have stood still
   int threads = 1;      ///< of held-out residuals and splits; 0: one a processor
 };
@@ -91,6 +94,7 @@ struct Calibration {
   std::vector<ComparedMethod> comparison;  ///< the answer last
   std::vector<ViewResult> views;
   RotationDiversity diversity;
+  std::optional<PlaceAlong> along;  ///< of a robot that turns about one axis, or nearly
   WeakestDirection weakest;
   std::optional<TargetSize> size;
   double size_begun = 1;           ///< of the target over the stated one, with which the solution began
@@ -110,7 +114,7 @@ void tell_first(Calibration& calibration, std::string sentence, bool refuses = f
 /// Pose pairs are seen by no camera.
 bool has_pixels(const Calibration& calibration);
 
-/// What all calibrations start with: enough views, enough axes, numbering and planar poses chosen, a
+/// What all calibrations start with: enough views, turns, numbering and planar poses chosen, a
 /// convention that closes. Returns the observations in use and fills `result` so far; where the target's size
 /// is to be solved for and is far from the stated one, both with poses of a target of
 /// Calibration::size_begun. Throws data::InputError.
@@ -119,6 +123,17 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
 
 /// Poses of the target as they were given, where prepare() had them resized.
 void restore_size(Calibration& result);
+
+/// The axis that nearly all turns are about, if there is one. Throws data::InputError where there is none,
+/// and a height was measured.
+std::optional<OneAxis> axis_of(Setup setup, const std::vector<Observation>& used,
+                               const CalibrateSettings& settings);
+
+/// Of the target from the camera, in the middle [m].
+double usual_distance(const std::vector<Observation>& observations);
+
+/// What an answer about one axis ends with: the covariances hold what is not told, and a warning says so.
+void state_along(Calibration& result);
 
 /// What all end with: views, observability, warnings. False where the answer is implausible, the first of
 /// them.

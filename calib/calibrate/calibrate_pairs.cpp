@@ -41,7 +41,7 @@ HeldOut hold_out_pairs(const std::vector<PoseLoop>& loops, int folds, const Fit&
 /// Halves of the pairs in time and by the gripper's places, each solved by itself: where they put the camera
 /// must agree, and in time the target too. Else something moved meanwhile, or the robot errs by its pose.
 void check_halves(Calibration& result, const std::vector<PoseLoop>& loops,
-                  const std::vector<Eigen::Vector3d>& places) {
+                  const std::vector<Eigen::Vector3d>& places, const std::optional<AlongPrior>& along) {
   constexpr std::size_t kEnough = 16;
   if (loops.size() < kEnough) return;
   std::vector<SplitCheck> checks;
@@ -51,7 +51,7 @@ void check_halves(Calibration& result, const std::vector<PoseLoop>& loops,
     for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
     PoseSpaceFit fits[2];
     for (int k = 0; k < 2; ++k)
-      fits[k] = fit_pose_space(parts[k], better_of(parts[k], shah(parts[k]), result.poses));
+      fits[k] = fit_pose_space(parts[k], better_of(parts[k], shah(parts[k]), result.poses), {}, along);
     const auto check = [&](const Eigen::Isometry3d& before, const Eigen::Isometry3d& after, Eigen::Index at) {
       SplitCheck halves{.split = split, .apart = motion_between(before, after)};
       const Matrix6d covariance = (fits[0].covariance + fits[1].covariance).block<6, 6>(at, at);
@@ -86,14 +86,15 @@ constexpr double kUsualSize = 0.01;  // standard deviation of what a size that i
 /// The size that pairs want, with nothing known of it. None where they do not tell it to a tenth.
 std::optional<TargetSize::Wanted> wanted_size(const std::vector<PoseLoop>& loops,
                                               const std::vector<Eigen::Vector3d>& places,
-                                              const HandEyePoses& seed) {
+                                              const HandEyePoses& seed,
+                                              const std::optional<AlongPrior>& along) {
   constexpr double kUnknown = 0.1;
-  const PoseSpaceFit fit = fit_pose_space(loops, seed, SizeUnknown{});
+  const PoseSpaceFit fit = fit_pose_space(loops, seed, SizeUnknown{}, along);
   const double noise = std::sqrt(fit.covariance(12, 12));
   if (!fit.converged || !(noise < kUnknown)) return std::nullopt;
   // Whose the noise is.
-  const double of_robot = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 0}).size,
-               of_camera = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 1}).size;
+  const double of_robot = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 0}, along).size,
+               of_camera = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 1}, along).size;
   // What the halves of the robot's places do not agree on, none of them sees by itself.
   double apart = 0;
   constexpr Split kSplits[] = {Split::consecutive, Split::place_1, Split::place_2, Split::place_3};
@@ -101,8 +102,8 @@ std::optional<TargetSize::Wanted> wanted_size(const std::vector<PoseLoop>& loops
     const std::vector<int> half = halves_of(places, split);
     std::vector<PoseLoop> parts[2];
     for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
-    const double ratio = fit_pose_space(parts[0], fit.poses, SizeUnknown{}).size /
-                         fit_pose_space(parts[1], fit.poses, SizeUnknown{}).size;
+    const double ratio = fit_pose_space(parts[0], fit.poses, SizeUnknown{}, along).size /
+                         fit_pose_space(parts[1], fit.poses, SizeUnknown{}, along).size;
     apart += std::pow(0.5 * std::log(ratio), 2) / static_cast<double>(std::size(kSplits));
   }
   return TargetSize::Wanted{fit.size, fit.size * std::hypot(std::max(noise, std::sqrt(apart)),
@@ -111,10 +112,11 @@ std::optional<TargetSize::Wanted> wanted_size(const std::vector<PoseLoop>& loops
 
 /// What the size is taken to be, and the pairs as seen of a target of that size.
 TargetSize settle_size(std::vector<PoseLoop>& loops, const std::vector<Eigen::Vector3d>& places,
-                       const HandEyePoses& seed, const CalibrateSettings& settings) {
+                       const HandEyePoses& seed, const std::optional<AlongPrior>& along,
+                       const CalibrateSettings& settings) {
   TargetSize size{.prior_sd = settings.target_size_sd.value_or(kUsualSize)};
   constexpr std::size_t kEnough = 8;
-  if (loops.size() >= kEnough) size.wanted = wanted_size(loops, places, seed);
+  if (loops.size() >= kEnough) size.wanted = wanted_size(loops, places, seed, along);
   if (std::isinf(size.prior_sd) && !size.wanted)
     throw data::InputError(
         "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
@@ -130,20 +132,23 @@ TargetSize settle_size(std::vector<PoseLoop>& loops, const std::vector<Eigen::Ve
 }
 
 /// How X follows a size that is off by `sd`.
-Matrix6d covariance_of_size(const std::vector<PoseLoop>& loops, const HandEyePoses& poses, double sd) {
+Matrix6d covariance_of_size(const std::vector<PoseLoop>& loops, const HandEyePoses& poses,
+                            const std::optional<AlongPrior>& along, double sd) {
   constexpr double kStep = 1e-3;
-  const Vector6d shift = motion_between(fit_pose_space(resized(loops, 1 - kStep), poses).poses.X,
-                                        fit_pose_space(resized(loops, 1 + kStep), poses).poses.X) *
-                         (sd / (2 * kStep));
+  const auto with = [&](double size) {
+    return fit_pose_space(resized(loops, size), poses, {}, along).poses.X;
+  };
+  const Vector6d shift = motion_between(with(1 - kStep), with(1 + kStep)) * (sd / (2 * kStep));
   return shift * shift.transpose();
 }
 
 /// A size that pairs exclude is the cause of whatever else does not fit, and of an answer that depends on it.
-void tell_size(Calibration& result, const std::vector<PoseLoop>& loops, const CalibrateSettings& settings) {
+void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,
+               const std::optional<AlongPrior>& along, const CalibrateSettings& settings) {
   const TargetSize& size = *result.size;
   if (!size.far_off()) return;
   const auto away_with = [&](double other) {
-    const PoseSpaceFit fit = fit_pose_space(resized(loops, other / size.estimate), result.poses);
+    const PoseSpaceFit fit = fit_pose_space(resized(loops, other / size.estimate), result.poses, {}, along);
     return motion_between(result.poses.X, fit.poses.X);
   };
   const auto excluded = [&](const Vector6d& away) {
@@ -206,8 +211,22 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   std::vector<PoseLoop> loops = pose_loops(setup, observations);
   // Half turns about three axes leave Shah's equations several solutions.
   const HandEyePoses seed = better_of(loops, shah(loops), result.selection.robust_seed.poses);
-  result.size = settle_size(loops, places, seed, settings);
-  const PoseSpaceFit fit = fit_pose_space(loops, seed);
+  const std::optional<OneAxis> axis = axis_of(setup, observations, settings);
+  std::optional<AlongPrior> along;
+  const double distance = usual_distance(observations);
+  if (axis) along = loose_along(*axis, seed, distance);
+  result.size = settle_size(loops, places, seed, along, settings);
+  PoseSpaceFit fit = fit_pose_space(loops, seed, {}, along);
+  if (axis) {
+    // The robot's turns are taken as they are reported: their noise pulls the place as far as the target.
+    const SettledPlace settled = settle_along(*axis, fit.poses, fit.covariance.topLeftCorner<6, 6>(),
+                                              fit.rotation, distance, distance, settings.height);
+    result.along = settled.place;
+    if (settled.hold) {
+      along = settled.hold;
+      fit = fit_pose_space(loops, moved_to(*along, *axis, fit.poses), {}, along);
+    }
+  }
   result.poses = fit.poses;
   result.covariance = result.repeatable = fit.covariance.topLeftCorner<6, 6>();
   result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation.rms()}, {0.0}};
@@ -219,8 +238,8 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
     if (method.name == "park") method.held_out = hold_out_pairs(compared, settings.folds, park);
     if (method.name == "shah") method.held_out = hold_out_pairs(compared, settings.folds, shah);
   }
-  result.held_out = hold_out_pairs(loops, settings.folds, [&fit](const std::vector<PoseLoop>& train) {
-    return fit_pose_space(train, better_of(train, shah(train), fit.poses)).poses;
+  result.held_out = hold_out_pairs(loops, settings.folds, [&](const std::vector<PoseLoop>& train) {
+    return fit_pose_space(train, better_of(train, shah(train), fit.poses), {}, along).poses;
   });
   result.use = use_error(Use::workspace, result.held_out, std::nullopt);
   result.comparison.push_back({.name = "pose_space",
@@ -228,10 +247,10 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .relative = relative_rms(compared, fit.poses.X),
                                .held_out = result.held_out});
   if (result.size->sd > 0)
-    result.repeatable = result.covariance += covariance_of_size(loops, fit.poses, result.size->sd);
-  check_halves(result, loops, places);
+    result.repeatable = result.covariance += covariance_of_size(loops, fit.poses, along, result.size->sd);
+  check_halves(result, loops, places, along);
   finish(result, observations);
-  tell_size(result, loops, settings);
+  tell_size(result, loops, along, settings);
   tell_size_of_few(result, all, settings);
   tell_unseen(result, observations);
   result.size->estimate *= result.size_begun;
@@ -247,6 +266,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   if (compared.size() < loops.size())
     result.warnings.push_back("other methods are compared on " + std::to_string(compared.size()) + " of " +
                               std::to_string(loops.size()) + " pairs, evenly spread");
+  state_along(result);
   return result;
 }
 

@@ -1,6 +1,7 @@
 #include "calib/calibrate/extrinsics.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -34,6 +35,23 @@ Vector6d parent_deviations(const Eigen::Isometry3d& T, const Matrix6d& covarianc
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = T.linear();
   return (turn * covariance * turn.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+}
+
+ToldDeviations told_deviations(const Calibration& calibration, Matrix6d covariance, Axes axes) {
+  constexpr double kLeans = 0.01;
+  const Eigen::Isometry3d& X = calibration.poses.X;
+  const bool in_parent = axes == Axes::parent;
+  Eigen::Vector3d untold = Eigen::Vector3d::Zero();
+  if (calibration.along && !calibration.along->told) {
+    covariance -= covariance_along(*calibration.along, X);
+    untold = in_parent ? calibration.along->axis.camera
+                       : Eigen::Vector3d(untold_direction(calibration.along->axis, X).head<3>());
+  }
+  const Vector6d sd = parent_deviations(in_parent ? X : Eigen::Isometry3d::Identity(), covariance);
+  ToldDeviations told;
+  for (Eigen::Index i = 0; i < 6; ++i)
+    if (i >= 3 || std::abs(untold[i]) < kLeans) told[static_cast<std::size_t>(i)] = sd[i];
+  return told;
 }
 
 namespace {

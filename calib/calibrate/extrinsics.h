@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,13 @@ std::string resolved(const std::string& path, const std::string& calibration);
 /// Standard deviations of a transform along and about the axes of its parent, in which its translation is
 /// written. covariance: of the right perturbation (dt, dtheta), along those of the child.
 Vector6d parent_deviations(const Eigen::Isometry3d& T, const Matrix6d& covariance);
+
+/// The standard deviations of a calibration's transform along and about the axes of its parent, or of the
+/// camera, as `covariance` has them. None along an axis that leans by more than 1 % to one along which
+/// nothing is told.
+using ToldDeviations = std::array<std::optional<double>, 6>;
+enum class Axes { parent, camera };
+ToldDeviations told_deviations(const Calibration& calibration, Matrix6d covariance, Axes axes);
 
 /// What flash-calib handeye wrote, as far as other programs need it.
 struct Extrinsics {

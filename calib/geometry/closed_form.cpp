@@ -11,6 +11,8 @@
 namespace flash::calib {
 namespace {
 
+constexpr double kNoTilt = 0.004;  // of turns about one axis [rad], and of the singular values that it makes
+
 /// Least squares for t_X and t_Z of R_G (R_X t_C s + t_X) + t_G = t_Z; with `scale` also for s.
 Eigen::VectorXd solve_translations(const std::vector<PoseLoop>& loops, const Eigen::Matrix3d& R_X,
                                    bool scale) {
@@ -25,8 +27,15 @@ Eigen::VectorXd solve_translations(const std::vector<PoseLoop>& loops, const Eig
     if (scale) A.block<3, 1>(3 * i, 6) = lever;
     b.segment<3>(3 * i) = -loop.G.translation() - (scale ? Eigen::Vector3d::Zero().eval() : lever);
   }
-  // Minimum norm where the rotations do not determine it.
-  return A.completeOrthogonalDecomposition().solve(b);
+  // Minimum norm where the rotations do not determine it: tilts of a fifth of a degree are noise.
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
+  if (!scale) decomposition.setThreshold(kNoTilt);
+  return decomposition.compute(A).solve(b);
+}
+
+/// The vector that a rotation turns about, by the sine of its angle: continuous beyond half a turn.
+Eigen::Vector3d sine_axis(const Eigen::Matrix3d& R) {
+  return 0.5 * Eigen::Vector3d(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1));
 }
 
 /// Closing errors, translations over the distance to the target.
@@ -91,6 +100,42 @@ HandEyePoses half_turns(const std::vector<PoseLoop>& loops) {
       best = poses;
     }
   return best;
+}
+
+HandEyePoses of_one_axis(const std::vector<PoseLoop>& loops) {
+  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < loops.size(); ++i)
+    for (std::size_t j = i + 1; j < loops.size(); ++j)
+      M += sine_axis(loops[j].G.linear().transpose() * loops[i].G.linear()) *
+           sine_axis(loops[j].C.linear() * loops[i].C.linear().transpose()).transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d axis = svd.matrixU().col(0);
+  const Eigen::Matrix3d R = Eigen::Quaterniond::FromTwoVectors(svd.matrixV().col(0), axis).toRotationMatrix();
+  // R_G (R(phi) R t_C + t_X) + t_G = t_Z is linear in cos phi and sin phi.
+  const auto count = static_cast<Eigen::Index>(loops.size());
+  Eigen::MatrixXd A(3 * count, 8);
+  Eigen::VectorXd b(3 * count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const PoseLoop& loop = loops[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d p = R * loop.C.translation(), along = axis * axis.dot(p);
+    A.block<3, 1>(3 * i, 0) = loop.G.linear() * (p - along);
+    A.block<3, 1>(3 * i, 1) = loop.G.linear() * axis.cross(p);
+    A.block<3, 3>(3 * i, 2) = loop.G.linear();
+    A.block<3, 3>(3 * i, 5) = -Eigen::Matrix3d::Identity();
+    b.segment<3>(3 * i) = -loop.G.translation() - loop.G.linear() * along;
+  }
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
+  decomposition.setThreshold(kNoTilt);
+  const Eigen::VectorXd x = decomposition.compute(A).solve(b);
+  HandEyePoses poses;
+  poses.X.linear() = rotation_exp(std::atan2(x[1], x[0]) * axis) * R;
+  const Eigen::VectorXd t = solve_translations(loops, poses.X.linear(), false);
+  poses.X.translation() = t.head<3>();
+  poses.Z.translation() = t.tail<3>();
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const PoseLoop& loop : loops) sum += loop.G.linear() * poses.X.linear() * loop.C.linear();
+  poses.Z.linear() = nearest_rotation(sum);
+  return poses;
 }
 
 HandEyePoses better_of(const std::vector<PoseLoop>& loops, const HandEyePoses& a, const HandEyePoses& b) {

@@ -34,6 +34,11 @@ HandEyePoses shah(const std::vector<PoseLoop>& loops);
 /// of each motion's the solution that closes best, its translations by least squares. Of three views.
 HandEyePoses half_turns(const std::vector<PoseLoop>& loops);
 
+/// Of views that turn about one axis alone. The axis, as the gripper and as the camera see it, tells all of
+/// X's rotation but the turn about it; that comes with both translations, by least squares, of how the
+/// gripper moves. What is left of the translations along the axis is the shortest.
+HandEyePoses of_one_axis(const std::vector<PoseLoop>& loops);
+
 /// How far Z^-1 G X C is from the identity.
 struct ClosingError {
   double rotation = 0;     ///< [rad]

@@ -105,6 +105,21 @@ Json lens_json(const data::CameraIntrinsics& lens) {
       {"focal_px", {lens.fx, lens.fy}}, {"centre_px", {lens.cx, lens.cy}}, {"distortion", lens.distortion}};
 }
 
+/// The axis that the robot turns about, and where the answer has camera and target along it.
+Json along_json(const PlaceAlong& along, const HandEyePoses& poses) {
+  Json json = {{"told", along.told},
+               {"camera_axis", list(along.axis.camera)},
+               {"camera_m", along.axis.camera.dot(poses.X.translation())},
+               {"target_axis", list(along.axis.target)},
+               {"target_m", along.axis.target.dot(poses.Z.translation())},
+               {"measured", nullptr}};
+  if (const std::optional<MeasuredHeight>& measured = along.measured)
+    json["measured"] = {{"what", measured->target ? "target" : "camera"},
+                        {"height_m", measured->height},
+                        {"sd_m", measured->sd}};
+  return json;
+}
+
 Json depth_json(const DepthUse& depth) {
   return {{"used", depth.used},
           {"reason", depth.used ? Json(nullptr) : Json(depth.reason)},
@@ -124,6 +139,13 @@ Json to_json(const NamedTransform& transform) {
           {"rotation_xyzw", list(v.tail<4>())}};
 }
 
+Json to_json(const ToldDeviations& deviations, bool rotation) {
+  Json values = Json::array();
+  for (std::size_t i = rotation ? 3 : 0, end = i + 3; i < end; ++i)
+    values.push_back(deviations[i] ? Json(*deviations[i] * (rotation ? kDegrees : 1e3)) : Json(nullptr));
+  return values;
+}
+
 Json to_json(const TargetSize& size) {
   return {{"estimate", size.estimate},
           {"sd", size.sd},
@@ -135,23 +157,24 @@ Json to_json(const TargetSize& size) {
 
 Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code) {
   const Extrinsics extrinsics = extrinsics_of(calibration, inputs);
-  const Vector6d sd = calibration.covariance.diagonal().cwiseSqrt();
   Json json = {{"schema", "flash-extrinsics/2"},
                {"setup", to_string(extrinsics.setup)},
                {"method", extrinsics.method},
                {"transform", to_json(extrinsics.transform)},
                {"target_pose", to_json(extrinsics.target_pose)},
                {"covariance", rows(calibration.covariance)}};
-  json["predicted_sd"] = {{"translation_mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
-                          {"rotation_deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
-  const Vector6d in_parent = parent_deviations(calibration.poses.X, calibration.covariance);
-  json["predicted_sd"]["translation_parent_mm"] = list(Eigen::Vector3d(1e3 * in_parent.head<3>()));
-  json["predicted_sd"]["rotation_parent_deg"] = list(Eigen::Vector3d(kDegrees * in_parent.tail<3>()));
+  const ToldDeviations sd = told_deviations(calibration, calibration.covariance, Axes::camera),
+                       in_parent = told_deviations(calibration, calibration.covariance, Axes::parent);
+  json["predicted_sd"] = {{"translation_mm", to_json(sd, false)},
+                          {"rotation_deg", to_json(sd, true)},
+                          {"translation_parent_mm", to_json(in_parent, false)},
+                          {"rotation_parent_deg", to_json(in_parent, true)}};
   if (extrinsics.pixels) {
-    const Vector6d here = parent_deviations(calibration.poses.X, calibration.repeatable);
-    json["predicted_sd"]["repeatable_parent_mm"] = list(Eigen::Vector3d(1e3 * here.head<3>()));
-    json["predicted_sd"]["repeatable_parent_deg"] = list(Eigen::Vector3d(kDegrees * here.tail<3>()));
+    const ToldDeviations here = told_deviations(calibration, calibration.repeatable, Axes::parent);
+    json["predicted_sd"]["repeatable_parent_mm"] = to_json(here, false);
+    json["predicted_sd"]["repeatable_parent_deg"] = to_json(here, true);
   }
+  json["one_axis"] = calibration.along ? along_json(*calibration.along, calibration.poses) : Json(nullptr);
   const auto px = [&](double value) { return extrinsics.pixels ? Json(value) : Json(nullptr); };
   const auto sight = [&](double SightNoise::*part) {
     return calibration.sight_noise ? Json((*calibration.sight_noise).*part) : Json(nullptr);

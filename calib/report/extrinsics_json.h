@@ -12,6 +12,9 @@ nlohmann::ordered_json to_json(const Calibration& calibration, const ExtrinsicsI
 /// {"estimate", "sd", "solved", "prior_sd", "wanted", "wanted_sd"}
 nlohmann::ordered_json to_json(const TargetSize& size);
 
+/// Three numbers, along the axes [mm] or about them [deg]; null: not told.
+nlohmann::ordered_json to_json(const ToldDeviations& deviations, bool rotation);
+
 /// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
 nlohmann::ordered_json to_json(const NamedTransform& transform);
 

@@ -10,6 +10,7 @@
 #include "calib/detect/grey_image.h"
 #include "calib/geometry/chain.h"
 #include "calib/report/extrinsics_export.h"
+#include "calib/report/extrinsics_json.h"
 #include "calib/report/jpeg.h"
 #include "data/motion/trajectory.h"
 #include "data/picture/html_page.h"
@@ -154,12 +155,12 @@ Json outline(const Eigen::Matrix3Xd& points) {
 
 /// The standard deviations along and about the axes of the parent frame, in which the translation is written.
 Json sd_in_parent(const Calibration& calibration) {
-  const Vector6d sd = parent_deviations(calibration.poses.X, calibration.covariance);
-  const Vector6d here = parent_deviations(calibration.poses.X, calibration.repeatable);
-  return {{"mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
-          {"deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))},
-          {"repeatable_mm", list(Eigen::Vector3d(1e3 * here.head<3>()))},
-          {"repeatable_deg", list(Eigen::Vector3d(kDegrees * here.tail<3>()))}};
+  const ToldDeviations sd = told_deviations(calibration, calibration.covariance, Axes::parent),
+                       here = told_deviations(calibration, calibration.repeatable, Axes::parent);
+  return {{"mm", to_json(sd, false)},
+          {"deg", to_json(sd, true)},
+          {"repeatable_mm", to_json(here, false)},
+          {"repeatable_deg", to_json(here, true)}};
 }
 
 std::string sentence(const char* format, double value, double other = 0) {
@@ -181,7 +182,12 @@ std::vector<std::string> next_steps(const Calibration& c) {
         std::abs(larger)));
   }
   const double second = kDegrees * c.diversity.spread.y();
-  if (second < kWideTurn)
+  if (c.along && !c.along->told)
+    steps.emplace_back(
+        "Measure where the camera or the target is along the axis that the robot turns about, and calibrate "
+        "with "
+        "--camera-height or --target-height.");
+  else if (second < kWideTurn)
     steps.push_back(sentence("Turn the gripper more about a second axis: so far %.1f deg rms.", second));
   if (c.used.size() < kEnough)
     steps.push_back(sentence("Add views: %.0f are in use, 15 or more make noise and uncertainty known.",
@@ -219,8 +225,10 @@ std::string render_report(const Calibration& calibration, const Extrinsics& extr
                     {"fy", camera.fy},       {"cx", camera.cx},         {"cy", camera.cy}};
   page["X"] = pose(calibration.poses.X);
   page["Z"] = pose(calibration.poses.Z);
-  page["ros"] = ros_static_transform(extrinsics.transform, extrinsics.lens);
-  page["urdf"] = urdf_joint(extrinsics.transform, extrinsics.lens);
+  const bool whole = !calibration.along || calibration.along->told;
+  const std::string missing = whole ? "" : untold_sentence(*calibration.along, calibration.setup);
+  page["ros"] = whole ? ros_static_transform(extrinsics.transform, extrinsics.lens) : missing;
+  page["urdf"] = whole ? urdf_joint(extrinsics.transform, extrinsics.lens) : missing;
   const std::string text = data::inside_script(page.dump(-1, ' ', false, Json::error_handler_t::replace));
   return data::fill_page(embedded::calibration_report_template(), {{"@DATA@", text}});
 }

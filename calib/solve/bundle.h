@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "calib/dataset/edge_offset.h"
@@ -10,6 +11,7 @@
 #include "calib/geometry/chain.h"
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose.h"
+#include "calib/solve/along_prior.h"
 #include "calib/solve/lens_prior.h"
 #include "data/camera/camera.h"
 
@@ -48,6 +50,7 @@ struct Priors {
   std::vector<LensPrior> lenses = {};      ///< of each camera; empty: nothing
   std::vector<double> warp_sd = {};        ///< of each number of each target's warp [m]; empty: flat
   double joint_zero_sd = kUsualJointZero;  ///< of each joint's zero [rad]
+  std::optional<AlongPrior> along = {};    ///< of the first camera or target
 };
 
 /// Of a target's scale; infinity where nothing is known.

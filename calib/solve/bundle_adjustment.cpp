@@ -12,6 +12,7 @@
 
 #include "calib/geometry/projection.h"
 #include "calib/solve/correction_error.h"
+#include "calib/solve/prior_costs.h"
 
 namespace flash::calib {
 namespace {
@@ -215,84 +216,19 @@ class CorrectionPrior final : public ceres::CostFunction {
   const RobotPose& pose_;
 };
 
-/// What is known of the zeros of joints beforehand.
-class JointZeroPrior final : public ceres::CostFunction {
+/// What is known beforehand of the place of a camera, or a target, along a line.
+class AlongCost final : public ceres::SizedCostFunction<1, 7> {
  public:
-  JointZeroPrior(int joints, double sd) : weight_(1 / sd) {
-    set_num_residuals(joints);
-    mutable_parameter_block_sizes()->push_back(joints);
-  }
+  explicit AlongCost(const AlongPrior& prior) : prior_(prior) {}
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    const int joints = num_residuals();
-    Eigen::Map<Eigen::VectorXd>(residual, joints) = weight_ * Eigen::Map<const Eigen::VectorXd>(x[0], joints);
-    if (jacobians && jacobians[0])
-      Eigen::Map<Eigen::MatrixXd>(jacobians[0], joints, joints) =
-          weight_ * Eigen::MatrixXd::Identity(joints, joints);
+    const AlongResidual along = along_residual(prior_, pose_of(x[0]));
+    *residual = along.value;
+    if (jacobians) set_pose_jacobian(jacobians[0], along.by_pose);
     return true;
   }
 
  private:
-  double weight_;
-};
-
-/// What is known of a target's size beforehand.
-class ScalePrior final : public ceres::SizedCostFunction<1, 1> {
- public:
-  explicit ScalePrior(double sd) : weight_(1 / sd) {}
-  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    *residual = weight_ * (*x[0] - 1);
-    if (jacobians && jacobians[0]) *jacobians[0] = weight_;
-    return true;
-  }
-
- private:
-  double weight_;
-};
-
-/// Likewise of its warp.
-class WarpPrior final : public ceres::SizedCostFunction<kWarp, kWarp> {
- public:
-  explicit WarpPrior(double sd) : weight_(1 / sd) {}
-  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    Eigen::Map<Warp>(residual, kWarp) = weight_ * Eigen::Map<const Warp>(x[0]);
-    if (jacobians && jacobians[0])
-      Eigen::Map<Eigen::Matrix<double, kWarp, kWarp>>(jacobians[0], kWarp, kWarp).setIdentity() *= weight_;
-    return true;
-  }
-
- private:
-  double weight_;
-};
-
-/// Likewise of how far edges stand outwards.
-class EdgePrior final : public ceres::SizedCostFunction<1, 1> {
- public:
-  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    *residual = *x[0] / kUsualEdgeOffset;
-    if (jacobians && jacobians[0]) *jacobians[0] = 1 / kUsualEdgeOffset;
-    return true;
-  }
-};
-
-/// One part of what is known of a lens.
-class LensPart final : public ceres::CostFunction {
- public:
-  LensPart(LensPrior::Rows rows, const IntrinsicsVector& stated) : rows_(std::move(rows)), stated_(stated) {
-    set_num_residuals(static_cast<int>(rows_.rows()));
-    mutable_parameter_block_sizes()->push_back(kIntrinsics);
-  }
-  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    Eigen::Map<Eigen::VectorXd>(residual, rows_.rows()) =
-        rows_ * (Eigen::Map<const IntrinsicsVector>(x[0]) - stated_);
-    if (jacobians && jacobians[0])
-      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kIntrinsics, Eigen::RowMajor>>(
-          jacobians[0], rows_.rows(), kIntrinsics) = rows_;
-    return true;
-  }
-
- private:
-  LensPrior::Rows rows_;
-  IntrinsicsVector stated_;
+  AlongPrior prior_;
 };
 
 /// The bundle as blocks of numbers, as Ceres wants it.
@@ -450,6 +386,10 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
       problem.AddResidualBlock(
           new JointZeroPrior(static_cast<int>(zeros.size()), bundle.priors.joint_zero_sd), nullptr,
           zeros.data());
+  if (const std::optional<AlongPrior>& along = bundle.priors.along) {
+    double* const block = (along->target ? blocks.targets : blocks.cameras).front().data();
+    if (problem.HasParameterBlock(block)) problem.AddResidualBlock(new AlongCost(*along), nullptr, block);
+  }
   for (double& tau : blocks.time_offsets)
     if (!unknowns.time_offsets) hold(problem, &tau);
   for (double& scale : blocks.depth_scales)

@@ -131,6 +131,15 @@ Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns)
     gram.row(columns.count).segment(first, count) += weight * zeros.transpose();
     gram(columns.count, columns.count) += weight * zeros.squaredNorm();
   }
+  if (const std::optional<AlongPrior>& along = bundle.priors.along) {
+    const AlongResidual residual =
+        along_residual(*along, (along->target ? bundle.targets : bundle.cameras).front());
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(columns.count + 1);
+    row.segment<6>((along->target ? columns.targets : columns.cameras).front()) =
+        residual.by_pose.transpose();
+    row[columns.count] = residual.value;
+    gram += row * row.transpose();
+  }
   for (std::size_t camera = 0; camera < bundle.priors.lenses.size(); ++camera) {
     const int first = columns.intrinsics[camera], count = columns.intrinsics_count;
     if (first < 0) continue;

@@ -75,7 +75,8 @@ NoisePrior noise_prior(std::size_t pairs) {
 }
 
 LinearModel linearize(const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit,
-                      const std::vector<double>& sigmas, const std::optional<SizeUnknown>& size) {
+                      const std::vector<double>& sigmas, const std::optional<SizeUnknown>& size,
+                      const std::optional<AlongPrior>& known) {
   const int shared = kPoses + (size ? 1 : 0);
   LinearModel model{.groups = 1, .components = kComponents, .own = 0, .shared = shared, .blocks = {}};
   model.noise = noise_prior(loops.size());
@@ -103,6 +104,14 @@ LinearModel linearize(const std::vector<PoseLoop>& loops, const PoseSpaceFit& fi
     row[shared] = std::log(fit.size) / size->prior_sd;
     model.prior = row.transpose() * row;
   }
+  if (known) {
+    const AlongResidual residual = along_residual(*known, known->target ? fit.poses.Z : fit.poses.X);
+    Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(shared + 1);
+    row.segment<6>(known->target ? 6 : 0) = residual.by_pose;
+    row[shared] = residual.value;
+    if (model.prior.size() == 0) model.prior.setZero(shared + 1, shared + 1);
+    model.prior += row.transpose() * row;
+  }
   return model;
 }
 
@@ -114,12 +123,12 @@ std::vector<PoseLoop> resized(std::vector<PoseLoop> loops, double size) {
 }
 
 PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePoses& seed,
-                            const std::optional<SizeUnknown>& size) {
+                            const std::optional<SizeUnknown>& size, const std::optional<AlongPrior>& along) {
   PoseSpaceFit fit{.poses = seed, .covariance = {}, .translation = {}};
   std::vector<double> sigmas(kComponents, 1e-2);
   const std::vector<double> floor(kComponents, 1e-7);
   for (int iteration = 0; iteration < 50 && !fit.converged; ++iteration) {
-    const LinearModel model = linearize(size ? resized(loops, fit.size) : loops, fit, sigmas, size);
+    const LinearModel model = linearize(size ? resized(loops, fit.size) : loops, fit, sigmas, size, along);
     const VarianceComponents estimate = estimate_variance_components(model, sigmas, floor);
     sigmas = estimate.sigmas;
     const LinearSolution solution = solve_linear(model, sigmas);

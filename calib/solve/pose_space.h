@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/geometry/closed_form.h"
+#include "calib/solve/along_prior.h"
 
 namespace flash::calib {
 
@@ -41,9 +42,10 @@ struct SizeUnknown {
 /// than what lies across. The three noise levels are of restricted maximum likelihood, the ratio of the last
 /// two with a prior that few pairs feel. A target at the camera's origin has no line of sight: all of its dt
 /// counts as across. Gauss and Newton. size: the target as seen is so many times as far away; none: it is as
-/// stated.
+/// stated. along: what is known of a place beforehand; none: nothing.
 PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePoses& seed,
-                            const std::optional<SizeUnknown>& size = {});
+                            const std::optional<SizeUnknown>& size = {},
+                            const std::optional<AlongPrior>& along = {});
 
 /// What is seen of a target that is so many times as large as stated.
 std::vector<PoseLoop> resized(std::vector<PoseLoop> loops, double size);

@@ -1,5 +1,6 @@
 #include "calib/solve/robust_seed.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +12,8 @@
 
 namespace flash::calib {
 namespace {
+
+constexpr double kParallel = 0.03;  // sine between axes that are taken for one
 
 using Candidates = std::vector<std::vector<Eigen::Isometry3d>>;
 
@@ -28,6 +31,7 @@ class Search {
     distance_ = std::max(data::median(distances), 1e-9);
     majority_ = std::max<std::size_t>(
         3, static_cast<std::size_t>(std::ceil(settings.majority * static_cast<double>(views_.size()))));
+    one_axis_ = turns_about_one_axis();
   }
 
   std::size_t size() const { return views_.size(); }
@@ -64,7 +68,11 @@ class Search {
       std::vector<PoseLoop> loops;
       for (const std::size_t i : best_views(result))
         loops.push_back({robot_[i], candidates_[i][static_cast<std::size_t>(result.choice[i])]});
-      const RobustSeed next = judge(shah(loops));
+      RobustSeed next = judge(shah(loops));
+      if (one_axis_) {
+        RobustSeed other = judge(of_one_axis(loops));
+        if (other.score < next.score) next = std::move(other);
+      }
       if (!(next.score < result.score)) break;
       result = next;
     }
@@ -79,7 +87,9 @@ class Search {
     const Eigen::Matrix3d A_ac = relative(robot_[c].inverse(), robot_[a]);
     const Eigen::Vector3d axis_ab = rotation_log(A_ab), axis_ac = rotation_log(A_ac);
     // Motions that turn little, or about one axis, determine little.
-    if (axis_ab.cross(axis_ac).norm() < 0.03 * std::max(axis_ab.norm(), axis_ac.norm())) return;
+    const bool parallel =
+        axis_ab.cross(axis_ac).norm() < kParallel * std::max(axis_ab.norm(), axis_ac.norm());
+    if (parallel && !one_axis_) return;
     for (const Eigen::Isometry3d& C_a : candidates_[a]) {
       for (const Eigen::Isometry3d& C_b : candidates_[b]) {
         const Eigen::Vector3d log_ab = rotation_log(relative(C_b, C_a.inverse()));
@@ -88,6 +98,8 @@ class Search {
           const Eigen::Vector3d log_ac = rotation_log(relative(C_c, C_a.inverse()));
           if (std::abs(log_ac.norm() - axis_ac.norm()) > settings_.angle_slack) continue;
           const std::vector<PoseLoop> loops = {{robot_[a], C_a}, {robot_[b], C_b}, {robot_[c], C_c}};
+          if (one_axis_) keep(judge(of_one_axis(loops)), best);
+          if (parallel) continue;
           keep(judge(park(loops)), best);
           if (M_PI - std::max(axis_ab.norm(), axis_ac.norm()) < settings_.angle_slack)
             keep(judge(half_turns(loops)), best);
@@ -103,6 +115,18 @@ class Search {
   }
 
  private:
+  bool turns_about_one_axis() const {
+    Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+    for (const std::size_t i : views_) {
+      const Eigen::Vector3d turn =
+          rotation_log(robot_[views_.front()].linear().transpose() * robot_[i].linear());
+      moment += turn * turn.transpose();
+    }
+    const Eigen::Vector3d squares =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moment, Eigen::EigenvaluesOnly).eigenvalues();
+    return squares[1] < kParallel * kParallel * squares[2];
+  }
+
   static Eigen::Matrix3d relative(const Eigen::Isometry3d& left, const Eigen::Isometry3d& right) {
     return left.linear() * right.linear();
   }
@@ -135,6 +159,7 @@ class Search {
   std::vector<std::size_t> views_;  // that have candidates
   std::size_t majority_ = 3;
   double distance_ = 1;
+  bool one_axis_ = false;
 };
 
 }  // namespace

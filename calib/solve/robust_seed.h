@@ -28,7 +28,7 @@ struct RobustSeed {
 /// error of all views (least trimmed squares, Rousseeuw and van Driessen 2006: the best are refined by
 /// concentration steps with Shah's method on the majority). robot: G of PoseLoop; candidates: poses of the
 /// target in the camera, one or more a view, none where the view is to be left out. Not found where fewer
-/// than three views have candidates or no three of them turn about two axes.
+/// than three views have candidates. Views that turn about one axis alone are solved by of_one_axis.
 RobustSeed find_robust_seed(const std::vector<Eigen::Isometry3d>& robot,
                             const std::vector<std::vector<Eigen::Isometry3d>>& candidates,
                             const RobustSeedSettings& settings = {});

@@ -7,13 +7,16 @@
 namespace flash::calib {
 namespace {
 
-/// The sign that makes the largest part positive.
 template <class Vector>
-Vector upright(const Vector& v) {
+Vector with_largest_positive(const Vector& v) {
   Eigen::Index largest = 0;
   v.cwiseAbs().maxCoeff(&largest);
   return v[largest] < 0 ? Vector(-v) : v;
 }
+
+}  // namespace
+
+Eigen::Vector3d upright(const Eigen::Vector3d& v) { return with_largest_positive(v); }
 
 std::string text_of(const Eigen::Vector3d& v) {
   char text[64];
@@ -21,8 +24,6 @@ std::string text_of(const Eigen::Vector3d& v) {
   std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", r.x(), r.y(), r.z());
   return text;
 }
-
-}  // namespace
 
 RotationDiversity rotation_diversity(const std::vector<Eigen::Isometry3d>& poses) {
   RotationDiversity diversity;
@@ -54,14 +55,7 @@ std::string degeneracy(const RotationDiversity& diversity, double least) {
                   diversity.spread[0] * 180 / M_PI);
     return text;
   }
-  if (diversity.spread[1] >= least) return {};
-  const std::string axis = text_of(upright(Eigen::Vector3d(diversity.axes.col(0))));
-  std::snprintf(
-      text, sizeof text,
-      "rotations turn about one axis only (%.4f of the spread): translation along that axis, %s of the "
-      "gripper, cannot be determined; add views that tilt about another",
-      diversity.first_share, axis.c_str());
-  return text;
+  return {};
 }
 
 WeakestDirection weakest_direction(const Matrix6d& covariance, double length, const std::string& frame) {
@@ -70,14 +64,13 @@ WeakestDirection weakest_direction(const Matrix6d& covariance, double length, co
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scale.asDiagonal() * covariance * scale.asDiagonal());
   const Vector6d values = eigen.eigenvalues().cwiseMax(0);
   WeakestDirection weakest;
-  weakest.direction = upright(Vector6d(eigen.eigenvectors().col(5)));
+  weakest.direction = with_largest_positive(Vector6d(eigen.eigenvectors().col(5)));
   const Eigen::Vector3d shift = weakest.direction.head<3>(), turn = weakest.direction.tail<3>();
   weakest.translation = std::sqrt(values[5]) * length * shift.norm();
   weakest.rotation = std::sqrt(values[5]) * turn.norm();
   weakest.condition = std::sqrt(values[5] / std::max(values[0], 1e-300));
-  weakest.name = shift.norm() > turn.norm()
-                     ? "translation along " + text_of(upright(Eigen::Vector3d(shift.normalized())))
-                     : "rotation about " + text_of(upright(Eigen::Vector3d(turn.normalized())));
+  weakest.name = shift.norm() > turn.norm() ? "translation along " + text_of(upright(shift.normalized()))
+                                            : "rotation about " + text_of(upright(turn.normalized()));
   weakest.name += " of the " + frame;
   return weakest;
 }

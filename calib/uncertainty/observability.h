@@ -16,9 +16,15 @@ struct RotationDiversity {
 };
 RotationDiversity rotation_diversity(const std::vector<Eigen::Isometry3d>& T_base_gripper);
 
-/// Fewer than two axes of rotation: one sentence that says so and what cannot be determined; else empty.
-/// least: rms turn about the second axis that counts [rad].
+/// No turns at all: one sentence that says what cannot be determined; else empty. least: rms turn that counts
+/// [rad].
 std::string degeneracy(const RotationDiversity& diversity, double least = 0.017);
+
+/// The sign that makes the largest part of a direction positive.
+Eigen::Vector3d upright(const Eigen::Vector3d& v);
+
+/// "(0.02, 0.01, 1.00)"
+std::string text_of(const Eigen::Vector3d& v);
 
 /// The direction of a pose that a calibration knows least.
 struct WeakestDirection {

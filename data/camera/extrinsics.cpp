@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdio>
 #include <initializer_list>
 
 #include "data/files/atomic_file.h"
@@ -104,6 +105,19 @@ void read_lenses(const JsonObject& file, CameraPose& pose) {
 
 namespace {
 
+/// Where a robot that turns about one axis does not tell where the camera is along it.
+void expect_whole(const JsonObject& file) {
+  if (!file.has("one_axis")) return;
+  const JsonObject along = file.object("one_axis");
+  if (along.boolean("told", true)) return;
+  const Eigen::VectorXd axis = along.vector("camera_axis", 3);
+  char text[80];
+  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", axis[0] + 0.0, axis[1] + 0.0, axis[2] + 0.0);
+  throw file.error("one_axis", std::string("a whole answer: where the camera is along ") + text +
+                                   " is not told, as the robot turns about that axis alone; measure it, and "
+                                   "calibrate with --camera-height or --target-height");
+}
+
 /// Of a trajectory, a list of poses, or a YAML file of one.
 Eigen::Isometry3d first_pose(const std::string& path) {
   const std::string extension = lower_extension(path);
@@ -143,11 +157,12 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
                       "comparison",  "views",      "observability", "convention_findings",
                       "scale",       "edges",      "splits",        "smooth_errors",
                       "joint_zeros", "use",        "warnings",      "exit_code",
-                      "provenance"});
+                      "one_axis",    "provenance"});
   // The second version has joint_zeros, use and the depth of comparisons; what is read here is in both.
   const std::string schema = file.string("schema", "");
   if (schema != "flash-extrinsics/1" && schema != "flash-extrinsics/2")
     throw file.error("schema", "\"flash-extrinsics/2\" or \"flash-extrinsics/1\"");
+  expect_whole(file);
   CameraPose pose;
   pose.transform = read_transform(file.object("transform"));
   expect_camera_in_parent(file.object("transform"), pose.transform);

@@ -28,7 +28,8 @@ struct CameraPose {
 
 /// `accept_unusable` is what --despite-doubts says. Without it an answer that cannot be used is refused.
 /// Throws InputError naming file, field, what was found and what was expected, also where the names of the
-/// frames are those of the inverse: a robot's frame in the camera.
+/// frames are those of the inverse, a robot's frame in the camera, and where one number of the pose is not
+/// told (one_axis).
 CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable);
 
 /// T_base_camera of a camera that stands still: such a file; a trajectory or list of poses (load_pose_list),

@@ -1,0 +1,92 @@
+#pragma once
+#include <ceres/ceres.h>
+
+#include <utility>
+
+#include "calib/dataset/edge_offset.h"
+#include "calib/dataset/target_shape.h"
+#include "calib/solve/lens_prior.h"
+
+namespace flash::calib {
+
+/// What is known of the zeros of joints beforehand.
+class JointZeroPrior final : public ceres::CostFunction {
+ public:
+  JointZeroPrior(int joints, double sd) : weight_(1 / sd) {
+    set_num_residuals(joints);
+    mutable_parameter_block_sizes()->push_back(joints);
+  }
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const int joints = num_residuals();
+    Eigen::Map<Eigen::VectorXd>(residual, joints) = weight_ * Eigen::Map<const Eigen::VectorXd>(x[0], joints);
+    if (jacobians && jacobians[0])
+      Eigen::Map<Eigen::MatrixXd>(jacobians[0], joints, joints) =
+          weight_ * Eigen::MatrixXd::Identity(joints, joints);
+    return true;
+  }
+
+ private:
+  double weight_;
+};
+
+/// What is known of a target's size beforehand.
+class ScalePrior final : public ceres::SizedCostFunction<1, 1> {
+ public:
+  explicit ScalePrior(double sd) : weight_(1 / sd) {}
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    *residual = weight_ * (*x[0] - 1);
+    if (jacobians && jacobians[0]) *jacobians[0] = weight_;
+    return true;
+  }
+
+ private:
+  double weight_;
+};
+
+/// Likewise of a target's warp.
+class WarpPrior final : public ceres::SizedCostFunction<kWarp, kWarp> {
+ public:
+  explicit WarpPrior(double sd) : weight_(1 / sd) {}
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    Eigen::Map<Warp>(residual, kWarp) = weight_ * Eigen::Map<const Warp>(x[0]);
+    if (jacobians && jacobians[0])
+      Eigen::Map<Eigen::Matrix<double, kWarp, kWarp>>(jacobians[0], kWarp, kWarp).setIdentity() *= weight_;
+    return true;
+  }
+
+ private:
+  double weight_;
+};
+
+/// Likewise of how far edges stand outwards.
+class EdgePrior final : public ceres::SizedCostFunction<1, 1> {
+ public:
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    *residual = *x[0] / kUsualEdgeOffset;
+    if (jacobians && jacobians[0]) *jacobians[0] = 1 / kUsualEdgeOffset;
+    return true;
+  }
+};
+
+/// One part of what is known of a lens.
+class LensPart final : public ceres::CostFunction {
+ public:
+  LensPart(LensPrior::Rows rows, const IntrinsicsVector& stated) : rows_(std::move(rows)), stated_(stated) {
+    set_num_residuals(static_cast<int>(rows_.rows()));
+    mutable_parameter_block_sizes()->push_back(kIntrinsics);
+  }
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    Eigen::Map<Eigen::VectorXd>(residual, rows_.rows()) =
+        rows_ * (Eigen::Map<const IntrinsicsVector>(x[0]) - stated_);
+    if (jacobians && jacobians[0])
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kIntrinsics, Eigen::RowMajor>>(
+          jacobians[0], rows_.rows(), kIntrinsics) = rows_;
+    return true;
+  }
+
+ private:
+  LensPrior::Rows rows_;
+  IntrinsicsVector stated_;
+};
+
+}  // namespace flash::calib
