@@ -112,10 +112,11 @@ void expect_whole(const JsonObject& file) {
   if (along.boolean("told", true)) return;
   const Eigen::VectorXd axis = along.vector("camera_axis", 3);
   char text[80];
-  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", axis[0] + 0.0, axis[1] + 0.0, axis[2] + 0.0);
-  throw file.error("one_axis", std::string("a whole answer: where the camera is along ") + text +
-                                   " is not told, as the robot turns about that axis alone; measure it, and "
-                                   "calibrate with --camera-height or --target-height");
+  const Eigen::Vector3d rounded = (100 * axis.head<3>()).array().round() / 100 + 0.0;  // no minus zero
+  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", rounded[0], rounded[1], rounded[2]);
+  throw along.error("told", std::string("true: where the camera is along ") + text +
+                                " is not known, as the robot turns about that axis alone; measure it, and "
+                                "calibrate with --camera-height or --target-height");
 }
 
 /// Of a trajectory, a list of poses, or a YAML file of one.

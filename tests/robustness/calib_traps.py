@@ -369,8 +369,8 @@ def traps():
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
     yield Trap("a misspelt setup", "in_hand", option("--setup", "eye-in-hnad"), 2, "--setup", "eye-in-hand,eye-to-hand")
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")
-    yield Trap("one axis", "one_axis", nothing, 2, "rotations turn about one axis only", "cannot be determined")
-    yield Trap("one axis, a noisy robot", "one_axis_noisy", nothing, 2, "rotations turn about one axis only")
+    yield Trap("one axis", "one_axis", nothing, 0, "is not told", "turns about that axis alone")
+    yield Trap("one axis, a noisy robot", "one_axis_noisy", nothing, 0, "is not told")
     yield Trap("flipped boards", "flipped", nothing, 0, "numbered from its other end", used=16)
 
 

@@ -102,6 +102,25 @@ class Cell:
         return path
 
 
+class FourAxisCell(Cell):
+    """The same by an arm that turns about the vertical alone."""
+
+    def __init__(self, views=20, seed=1, robot_mm=0.2, robot_deg=0.02):
+        rng = random.Random(seed)
+        self.camera, self.target = pose([0.05, 0.02, 0.08], [0.1, -0.2, 0.4]), pose([0.6, 0.1, 0.02], [0.1, 3.0, 0.2])
+        self.seen, self.robot = [], []
+        for _ in range(views):
+            down = multiply(pose([0, 0, 0], [0, 0, rng.uniform(-1.2, 1.2)]), pose([0, 0, 0], [math.pi, 0, 0]))
+            # Where the target is seen, from which the gripper's place follows.
+            middle = multiply(self.camera, pose([rng.uniform(-.08, .08), rng.uniform(-.08, .08), rng.uniform(.4, .6)], [0, 0, 0]))
+            held = multiply(down, middle)
+            robot = [[*row[:3], self.target[i][3] - held[i][3]] for i, row in enumerate(down[:3])] + [[0, 0, 0, 1]]
+            error = pose([rng.gauss(0, robot_mm / 1000) for _ in range(3)],
+                         [rng.gauss(0, math.radians(robot_deg)) for _ in range(3)])
+            self.robot.append(robot)
+            self.seen.append(multiply(multiply(inverse(self.camera), inverse(multiply(robot, error))), self.target))
+
+
 def longer(T, factor):
     return [[*row[:3], row[3] * factor] for row in T[:3]] + [T[3]]
 
@@ -135,6 +154,12 @@ def pairs(change=lambda cell: None, **settings):
     return make
 
 
+def pairs_with(*options):
+    def make(folder, sets):
+        return [*pairs()(folder, sets), *options]
+    return make
+
+
 def pictures(change, *options, name="in_hand"):
     """handeye on a copy of drawn pictures."""
     def make(folder, sets):
@@ -142,6 +167,29 @@ def pictures(change, *options, name="in_hand"):
         more = change(folder / "set") or []
         return ["handeye", folder / "set", *options, *more]
     return make
+
+
+def four_axis_pairs(*options):
+    def make(folder, sets):
+        return ["handeye", FourAxisCell().write(folder / "pairs.json"), "--setup", "eye-in-hand", *options]
+    return make
+
+
+def all_but_height(answer):
+    """x, y and yaw with deviations, z not told."""
+    x, y, z = answer["predicted_sd"]["translation_parent_mm"]
+    place, yaw = answer["transform"]["translation"], answer["predicted_sd"]["rotation_parent_deg"][2]
+    if z is not None or answer["one_axis"]["told"] or not (x < 1 and y < 1 and yaw < 0.2):
+        return f"deviations of {x}, {y}, {z} mm and {yaw} deg"
+    off = [abs(place[0] - 0.05) * 1000 / x, abs(place[1] - 0.02) * 1000 / y]
+    return "" if max(off) < 4 else f"is off by {off} deviations"
+
+
+def whole_by_height(answer):
+    sd, place = answer["predicted_sd"]["translation_parent_mm"], answer["transform"]["translation"]
+    if not answer["one_axis"]["told"] or not 0.9 < sd[2] < 1.5:
+        return f"deviations of {sd} mm by a height to 1 mm"
+    return "" if abs(place[2] - 0.08) < 4e-3 else f"the camera is at {place[2]} m, expected 0.08"
 
 
 def stands_still(cell):
@@ -325,6 +373,13 @@ def reports():
     yield Report("KUKA's A, B, C", pictures(kuka), ANSWERED)
     yield Report("quaternions without a header, w last", pictures(quaternions_w_last), ANSWERED, "quaternion x y z w")
     yield Report("quaternions without a header, w first", pictures(quaternions_w_first), REFUSED, "quaternions are w x y z")
+
+
+    yield Report("SCARA", four_axis_pairs(), ANSWERED, "is not told", "--target-height", holds=all_but_height)
+    yield Report("SCARA, the target's height measured", four_axis_pairs("--target-height", "0.02:0.001"), ANSWERED,
+                 unsaid=("not told",), holds=whole_by_height)
+    yield Report("SCARA, as URDF", four_axis_pairs("--urdf", "joint.urdf"), REFUSED, "--urdf", "is not told")
+    yield Report("two axes and a height", pairs_with("--camera-height", "0.08"), REFUSED, "--camera-height", "leave it out")
 
 
 def draw(tool, sets):

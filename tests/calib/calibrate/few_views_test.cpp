@@ -28,12 +28,12 @@ Count count_inside(Setup setup, int views, unsigned first_seed, const Solve& sol
     const HandEyeScene scene = make_scene(settings, protocol_points(setup), seed);
     try {
       const Calibration result = solve(scene);
-      if (!result.usable) continue;
+      if (!result.usable || (result.along && !result.along->told)) continue;
       const Vector6d error = motion_between(result.poses.X, scene.truth.X);
       ++count.answered;
       count.inside += error.dot(result.covariance.ldlt().solve(error)) < kChiSquare95;
     } catch (const data::InputError&) {
-      continue;  // turns about one axis, by chance
+      continue;  // hardly turns, by chance
     }
   }
   return count;

@@ -52,6 +52,19 @@ TEST_F(ExtrinsicsFile, ACameraInMillimetresIsRefused) {
                   "these millimetres?");
 }
 
+TEST_F(ExtrinsicsFile, APartialAnswerIsRefusedWithWhatItLacks) {
+  EXPECT_EQ(
+      refusal(R"(, "one_axis": {"told": false, "camera_axis": [-0.001, 0, 1], "camera_m": 0.1})"),
+      (folder_ / "camera.json") +
+          ": one_axis.told: found false, expected true: where the camera is along (0.00, 0.00, 1.00) is not "
+          "known, as the robot turns about that axis alone; measure it, and calibrate with --camera-height "
+          "or "
+          "--target-height");
+  EXPECT_NO_THROW(load_camera_pose(
+      write(R"(, "one_axis": {"told": true, "camera_axis": [0, 0, 1], "camera_m": 0.1})"), false));
+  EXPECT_NO_THROW(load_camera_pose(write(R"(, "one_axis": null)"), false));
+}
+
 TEST_F(ExtrinsicsFile, AnAnswerThatCannotBeUsedIsRefusedUnlessAccepted) {
   const std::string bad = R"(, "exit_code": 3, "warnings": ["rotations turn about one axis only", "second"])";
   EXPECT_EQ(refusal(bad),
