@@ -122,6 +122,8 @@ void add_plan_verb(CLI::App& app, Action& action) {
                    "How far beyond the poses used, where the bounds allow [m]")
       ->check(number_between(0, 10))
       ->capture_default_str();
+  verb->add_flag("--four-axes", options->settings.one_axis,
+                 "Of an arm that turns about one axis alone: poses that it can take");
   verb->add_option("--criterion", options->criterion,
                    "trace: sum of variances; determinant: volume of the region")
       ->check(CLI::IsMember({"trace", "determinant"}))

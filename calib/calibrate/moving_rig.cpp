@@ -237,7 +237,7 @@ Calibration solve_knocked(const Calibration& whole, const Knock& knock, std::siz
   Calibration answer;
   try {  // the part may have been knocked as well
     answer = calibrate_moving(side_of(all, first, !other.before), points, solve);
-  } catch (const data::InputError& error) {  // a part alone may turn about one axis only
+  } catch (const data::InputError& error) {  // a part alone may hardly turn
     answer = whole;
     char text[200];
     std::snprintf(text, sizeof text,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 
 #include "calib/geometry/projection.h"
@@ -72,7 +73,31 @@ double worth(const Matrix6d& covariance, PlanCriterion criterion, double length)
          length * length * covariance.bottomRightCorner<3, 3>().trace();
 }
 
-std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const PlanSettings& settings) {
+/// About which the candidates of an arm that cannot tilt turn, in the gripper.
+std::optional<Eigen::Vector3d> only_axis(const Calibration& calibration, const PlanSettings& settings) {
+  if (!settings.one_axis) return std::nullopt;
+  if (!calibration.along)
+    throw data::InputError("plan: --four-axes: the robot turns about more than one axis; leave it out");
+  const OneAxis& axis = calibration.along->axis;
+  return calibration.setup == Setup::eye_in_hand ? axis.camera : axis.target;
+}
+
+/// What is known of X and Z, and nothing of a place along the axis that is merely held.
+Eigen::MatrixXd information_of(const Calibration& calibration, const SharedColumns& columns, double loose,
+                               const PlanSettings& settings) {
+  Eigen::MatrixXd information =
+      calibration.refined.covariance.topLeftCorner(columns.count, columns.count).inverse();
+  const std::optional<AlongPrior>& held = calibration.refined.bundle.priors.along;
+  if (!held || !calibration.along || calibration.along->told || settings.one_axis) return information;
+  const int first = (held->target ? columns.targets : columns.cameras).front();
+  const Eigen::Matrix<double, 1, 6> row =
+      along_residual(*held, held->target ? calibration.poses.Z : calibration.poses.X).by_pose;
+  information.block<6, 6>(first, first) -= (1 - std::pow(held->sd / loose, 2)) * row.transpose() * row;
+  return information;
+}
+
+std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const std::optional<Eigen::Vector3d>& axis,
+                                          const PlanSettings& settings) {
   Eigen::Vector3d lower = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
   std::vector<Eigen::Isometry3d> used;
   for (const RobotPose& pose : bundle.poses) {
@@ -107,9 +132,12 @@ std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const PlanSettin
     const auto from = static_cast<std::size_t>(uniform(random) * static_cast<double>(used.size()));
     const double heading = 2 * M_PI * uniform(random), tilt = settings.tilt * std::sqrt(uniform(random));
     const double turn = settings.turn * (2 * uniform(random) - 1);
-    T.linear() = (i % 2 == 0 ? mean : used[from].linear()) *
-                 rotation_exp({tilt * std::cos(heading), tilt * std::sin(heading), 0}) *
-                 rotation_exp({0, 0, turn});
+    const Eigen::Matrix3d& start = i % 2 == 0 ? mean : used[from].linear();
+    if (axis)
+      T.linear() = start * rotation_exp(turn * *axis);
+    else
+      T.linear() = start * rotation_exp({tilt * std::cos(heading), tilt * std::sin(heading), 0}) *
+                   rotation_exp({0, 0, turn});
     poses.push_back(T);
   }
   return poses;
@@ -124,7 +152,7 @@ Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
   const Unknowns unknowns;  // lens, sizes and times as they are
   const SharedColumns columns = shared_columns(bundle, unknowns);
   std::vector<Candidate> candidates;
-  for (const Eigen::Isometry3d& T : draw_poses(bundle, settings)) {
+  for (const Eigen::Isometry3d& T : draw_poses(bundle, only_axis(calibration, settings), settings)) {
     const PoseLoop loop = pose_loop(bundle.setup, T, Eigen::Isometry3d::Identity());
     const Eigen::Isometry3d T_camera_target =
         calibration.poses.X.inverse() * loop.G.inverse() * calibration.poses.Z;
@@ -145,8 +173,7 @@ Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
     return std::sqrt(
         (rotation ? covariance.bottomRightCorner<3, 3>() : covariance.topLeftCorner<3, 3>()).trace() / 3);
   };
-  Eigen::MatrixXd information =
-      calibration.refined.covariance.topLeftCorner(columns.count, columns.count).inverse();
+  Eigen::MatrixXd information = information_of(calibration, columns, length, settings);
   const Matrix6d start = camera_covariance(information);
   plan.translation_sd = sd(start, false);
   plan.rotation_sd = sd(start, true);

@@ -19,8 +19,10 @@ struct PlanSettings {
   Eigen::Vector3d upper = Eigen::Vector3d::Constant(1e9);
   double reach =
       0.10;  ///< how far beyond the box of the poses already used candidates go, where bounds allow [m]
-  double tilt = 0.6;      ///< of the gripper from the mean orientation, at most [rad]
-  double turn = 1.2;      ///< about its axis from the mean orientation, at most [rad]
+  double tilt = 0.6;  ///< of the gripper from the mean orientation, at most [rad]
+  double turn = 1.2;  ///< about its axis from the mean orientation, at most [rad]
+  bool one_axis =
+      false;  ///< of an arm that cannot tilt: turns about its axis alone, the place along it aside
   double margin_px = 20;  ///< of the target's points from the edge of the picture
   double steepest = 1.1;  ///< angle between line of sight and the target's normal, at most [rad]
   int candidates = 2000;
@@ -42,7 +44,8 @@ struct Plan {
 /// Next poses, one after the other, each the candidate that lowers the predicted covariance of X most: the
 /// information of a view with the noise levels of the calibration, its robot correction marginalised, is
 /// added to what is there. Candidates are drawn around the poses used, kept within the bounds, and must see
-/// all of the target. Throws data::InputError where none does.
+/// all of the target. A place along the axis of turns that is not told counts, unless no pose could tell it.
+/// Throws data::InputError where no candidate sees the target, and where an arm of one axis turned about two.
 Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
                 const PlanSettings& settings = {});
 
