@@ -185,6 +185,13 @@ def refused(calib, work, truth):
         yield done.returncode == 2 and expected in done.stderr and done.stderr.count("\n") == 1, \
             f"{words}: {done.returncode} {done.stderr!r}, expected {expected!r}"
         yield before == after, f"{words}: something was written"
+    partial = work / "partial.json"
+    partial.write_text(json.dumps(json.loads(pathlib.Path(file).read_text()) | {
+        "one_axis": {"told": False, "camera_axis": [0, 0, 1], "camera_m": 0, "target_axis": [0, 0, 1], "target_m": 0, "measured": None}}))
+    for kind in ("urdf", "xacro", "tf", "mjcf", "usd", "easy_handeye2", "opencv"):
+        done = program.call(calib, "export", partial, "--to", kind, "-o", work / "of_partial")
+        yield done.returncode == 2 and "one_axis.told: found false" in done.stderr and done.stderr.count("\n") == 1 \
+            and not (work / "of_partial").exists(), f"a partial answer as {kind}: {done.returncode} {done.stderr!r}"
 
 
 def main():

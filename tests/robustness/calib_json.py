@@ -14,7 +14,7 @@ BOARD = "chessboard:9x6:0.025"
 BY_NAME = ("comparison", "parameters")  # methods; coefficients of a lens
 EXPECTED = ("splits.knock.other_transform", "splits.place_3.chi_square", "smooth_errors.reach", "depth.over_corners",
             "comparison.park.behind.px", "scale.warp_mm", "predicted_sd.repeatable_parent_mm", "clouds.views.tilt_deg",
-            "bases.workspace_sd_mm", "scales.wanted", "poses.translation_sd_mm", "views.readings.pixels", "parameters.fx.sd")
+            "one_axis.camera_axis", "one_axis.measured.height_m", "bases.workspace_sd_mm", "scales.wanted", "poses.translation_sd_mm", "views.readings.pixels", "parameters.fx.sd")
 
 
 def draw(tool, work):
@@ -22,6 +22,7 @@ def draw(tool, work):
     program.must(tool, work / "wrist", "eye-in-hand", BOARD, 16, size, *robot, 1, "depth_mm=1")
     program.must(tool, work / "knocked", "eye-in-hand", BOARD, 18, size, *robot, 4)
     poses_changed(knocked_before(9))(work / "knocked")
+    program.must(tool, work / "one_axis", "eye-in-hand", BOARD, 16, size, *robot, 5, "motion=one-axis")
     for name, seed in (("left", 2), ("right", 3)):
         program.must(tool, work / name, "eye-to-hand", BOARD, 12, size, *robot, seed)
 
@@ -41,6 +42,7 @@ def outputs(calib, work):
     ahead = [place[i] + row[2] for i, row in enumerate(program.rotation_of(left["transform"]["rotation_xyzw"]))]  # a metre before the camera
     (work / "touched.csv").write_text("x,y,z,u,v\n" + ",".join(map(str, (*ahead, cx, cy))) + "\n")
     for words in (("handeye", work / "pairs.samples", "--setup", "eye-to-hand"),
+                  ("handeye", work / "one_axis", "--target-height", "0:0.005", *cache),
                   ("register", work / "left/camera.json", work / "right/camera.json", "--workspace", "0.4,0,0.1", *cache),
                   ("register", work / "left/camera.json", work / "right/camera.json", "--without-images"),
                   ("validate", work / "wrist", "--extrinsics", work / "wrist/camera.json", *cache),

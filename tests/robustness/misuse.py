@@ -59,6 +59,7 @@ def write_inputs(folder):
              "transform": {"translation": [0.2, 0.2, 1], "rotation_xyzw": [1, 0, 0, 0]}}
     depth_view(folder / "view", sound)
     clouds(folder / "many", 200)
+    (folder / "partial.json").write_text(json.dumps(sound | {"one_axis": {"told": False, "camera_axis": [0, 0, 1], "camera_m": 1}}))
     (folder / "unusable.json").write_text(json.dumps(sound | {"exit_code": 3, "warnings": ["one axis only", "second"]}))
     for name, old, new in (("tele", "[50", "[1e300"), ("centre", "0, 4,", "0, 1e300,")):
         (folder / f"{name}.yaml").write_text(CAMERA.replace(old, new, 1))
@@ -343,6 +344,8 @@ def check_calibration(options, folder):
                        "exit_code", "one axis only", "--despite-doubts")
     yield from refused(options, folder, [*words, "--extrinsics", "unusable.json", "--force", "-o", "lift"],
                        "exit_code", "--despite-doubts")
+    yield from refused(options, folder, [*words, "--extrinsics", "partial.json", "--despite-doubts", "-o", "lift"],
+                       "partial.json", "one_axis.told", "--target-height")
     expected = ["flash-calib handeye ended with exit code 3, an answer that cannot be used", "one axis only", "second"]
     for extrinsics, texts in (("unusable.json", expected), ("view/extrinsics.json", ["two views were left out"])):
         done = program.call(*words, "--extrinsics", extrinsics, "--despite-doubts", "--force", "-o", "lift", cwd=folder)
