@@ -164,7 +164,7 @@ void settle_place(Calibration& result, const std::vector<Observation>& observati
   const double distance = usual_distance(observations);
   // The robot's errors may turn about any place between gripper and target.
   const SettledPlace settled =
-      settle_along(*axis, {bundle.cameras.front(), bundle.targets.front()},
+      settle_along(*axis, *bundle.priors.along, {bundle.cameras.front(), bundle.targets.front()},
                    result.refined.covariance.topLeftCorner<6, 6>(), result.refined.noise.rotation.front(),
                    0.5 * distance, distance, settings.height);
   result.along = settled.place;

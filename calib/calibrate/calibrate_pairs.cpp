@@ -219,7 +219,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   PoseSpaceFit fit = fit_pose_space(loops, seed, {}, along);
   if (axis) {
     // The robot's turns are taken as they are reported: their noise pulls the place as far as the target.
-    const SettledPlace settled = settle_along(*axis, fit.poses, fit.covariance.topLeftCorner<6, 6>(),
+    const SettledPlace settled = settle_along(*axis, *along, fit.poses, fit.covariance.topLeftCorner<6, 6>(),
                                               fit.rotation, distance, distance, settings.height);
     result.along = settled.place;
     if (settled.hold) {

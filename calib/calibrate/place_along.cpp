@@ -11,8 +11,8 @@ AlongPrior loose_along(const OneAxis& axis, const HandEyePoses& seed, double dis
   return {.axis = axis.camera, .place = axis.camera.dot(seed.X.translation()), .sd = distance};
 }
 
-SettledPlace settle_along(const OneAxis& axis, const HandEyePoses& poses, const Matrix6d& covariance,
-                          double rotation_noise, double lever, double distance,
+SettledPlace settle_along(const OneAxis& axis, const AlongPrior& loose, const HandEyePoses& poses,
+                          const Matrix6d& covariance, double rotation_noise, double lever, double distance,
                           const std::optional<MeasuredHeight>& measured) {
   constexpr double kHeld = 1e-5;  // [m]
   SettledPlace settled{.place = {.axis = axis}};
@@ -31,8 +31,9 @@ SettledPlace settle_along(const OneAxis& axis, const HandEyePoses& poses, const 
   const double whole = std::hypot(seeming, std::sqrt(direction.dot(covariance * direction)));
   place.told = whole < PlausibilitySettings{}.deviation * distance;
   place.sd = place.told ? seeming : 0;
-  if (!place.told)
-    settled.hold = {.axis = axis.camera, .place = axis.camera.dot(poses.X.translation()), .sd = kHeld};
+  if (place.told) return settled;
+  settled.hold = loose;
+  settled.hold->sd = kHeld;
   return settled;
 }
 

@@ -32,16 +32,17 @@ constexpr double kUntoldSd = 10;
 /// distance to the target [m].
 AlongPrior loose_along(const OneAxis& axis, const HandEyePoses& seed, double distance);
 
-/// Decides, by a solution with that prior, whether the turns tell the place: to a tenth of the distance to
-/// the target, as any answer has to. covariance: of X. Turns that are noise of the robot's poses seem to tell
-/// it, and do so with an error of `lever` [m], how far from the gripper the robot's errors may turn. Returns
-/// what to hold the solution at where they do not, or where it was measured: by 10 um.
+/// Decides, by a solution with the prior `loose`, whether the turns tell the place: to a tenth of the
+/// distance to the target, as any answer has to. covariance: of X. Turns that are noise of the robot's poses
+/// seem to tell it, and do so with an error of `lever` [m], how far from the gripper the robot's errors may
+/// turn. Returns what to hold the solution at, by 10 um: where it was measured, or, if the turns do not tell
+/// it, where the solution began.
 struct SettledPlace {
   PlaceAlong place;
   std::optional<AlongPrior> hold = {};
 };
-SettledPlace settle_along(const OneAxis& axis, const HandEyePoses& poses, const Matrix6d& covariance,
-                          double rotation_noise, double lever, double distance,
+SettledPlace settle_along(const OneAxis& axis, const AlongPrior& loose, const HandEyePoses& poses,
+                          const Matrix6d& covariance, double rotation_noise, double lever, double distance,
                           const std::optional<MeasuredHeight>& measured);
 
 /// Camera and target, moved along the axis to where they are held.
