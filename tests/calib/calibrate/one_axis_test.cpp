@@ -141,10 +141,10 @@ TEST_P(FourAxes, HeightIsRefusedWhereTwoAxesTellIt) {
 INSTANTIATE_TEST_SUITE_P(Setups, FourAxes,
                          testing::Values(Case{Setup::eye_in_hand, false}, Case{Setup::eye_to_hand, false},
                                          Case{Setup::eye_in_hand, true}, Case{Setup::eye_to_hand, true}),
-                         [](const auto& info) {
-                           return std::string(info.param.setup == Setup::eye_in_hand ? "EyeInHand"
-                                                                                     : "EyeToHand") +
-                                  (info.param.pairs ? "Pairs" : "Pictures");
+                         [](const auto& tested) {
+                           return std::string(tested.param.setup == Setup::eye_in_hand ? "EyeInHand"
+                                                                                       : "EyeToHand") +
+                                  (tested.param.pairs ? "Pairs" : "Pictures");
                          });
 
 }  // namespace

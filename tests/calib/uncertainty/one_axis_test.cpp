@@ -101,8 +101,8 @@ TEST(OneAxis, TiltsOfTheNoiseAreNoise) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Setups, AboutOneAxis, testing::Values(Setup::eye_in_hand, Setup::eye_to_hand),
-                         [](const auto& info) {
-                           return info.param == Setup::eye_in_hand ? "EyeInHand" : "EyeToHand";
+                         [](const auto& setup) {
+                           return setup.param == Setup::eye_in_hand ? "EyeInHand" : "EyeToHand";
                          });
 
 }  // namespace
