@@ -15,11 +15,11 @@ std::vector<ComparedMethod> compare_closed_forms(const std::vector<PoseLoop>& lo
     ComparedMethod& method = methods.emplace_back();
     method.name = form.name;
     const std::optional<HandEyePoses> poses = form.solve(loops);
-    method.wild = !poses;
-    if (!poses) continue;
+    method.wild = !poses || !poses->X.matrix().allFinite();
+    if (method.wild) continue;
     method.poses = *poses;
     method.relative = relative_rms(loops, poses->X);
-    method.wild = !poses->X.matrix().allFinite() || !std::isfinite(method.relative.rotation);
+    method.wild = !std::isfinite(method.relative.rotation);
   }
   double rotation = std::numeric_limits<double>::infinity(), translation = rotation;
   for (const ComparedMethod& method : methods) {

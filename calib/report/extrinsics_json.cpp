@@ -105,12 +105,13 @@ Json lens_json(const data::CameraIntrinsics& lens) {
       {"focal_px", {lens.fx, lens.fy}}, {"centre_px", {lens.cx, lens.cy}}, {"distortion", lens.distortion}};
 }
 
-/// The axis that the robot turns about, and where the answer has camera and target along it.
+/// The axis that the robot turns about, without minus zeros, and where the answer has camera and target along
+/// it.
 Json along_json(const PlaceAlong& along, const HandEyePoses& poses) {
   Json json = {{"told", along.told},
-               {"camera_axis", list(along.axis.camera)},
+               {"camera_axis", list(Eigen::Vector3d(along.axis.camera.array() + 0.0))},
                {"camera_m", along.axis.camera.dot(poses.X.translation())},
-               {"target_axis", list(along.axis.target)},
+               {"target_axis", list(Eigen::Vector3d(along.axis.target.array() + 0.0))},
                {"target_m", along.axis.target.dot(poses.Z.translation())},
                {"measured", nullptr}};
   if (const std::optional<MeasuredHeight>& measured = along.measured)
