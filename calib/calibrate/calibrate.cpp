@@ -281,7 +281,8 @@ void warn(Calibration& result) {
         " views: noise levels and uncertainty are themselves uncertain; 15 or more are better");
   constexpr double kWideTurn = 10;  // [deg]
   const double second = result.diversity.spread.y() / kDegree;
-  if (second < kWideTurn && !(result.along && !result.along->told)) {
+  const bool settled = result.along && (!result.along->told || result.along->measured);
+  if (second < kWideTurn && !settled) {
     char text[240];
     std::snprintf(
         text, sizeof text,
