@@ -22,7 +22,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study
+.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study watch-study
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
 .PHONY: cell pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
@@ -137,6 +137,10 @@ motion-study: configure-test  ## Say which motions hand-eye calibration claims a
 moving-arm-study: configure-test  ## Say whether hand-eye calibration finds the camera's clock and pose while the arm moves, from blurred pictures that are 30 ms late
 	cmake --build $(BUILD) -j $(JOBS) --target moving_arm_study
 	$(BUILD)/tests/moving_arm_study
+
+watch-study: configure-test  ## Say how many views following the next pose of flash-calib watch takes, beside views at random, over ten simulated cells of each kind
+	cmake --build $(BUILD) -j $(JOBS) --target watch_study
+	$(BUILD)/tests/watch_study
 
 kinhec: configure-test  ## Say how pairs of the public benchmark KinHEC (pip install kinhec) are answered beside its own methods
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib
