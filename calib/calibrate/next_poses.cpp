@@ -27,31 +27,27 @@ bool visible(const Eigen::Isometry3d& T_camera_target, const data::CameraIntrins
   const Eigen::Vector3d sight = (T_camera_target * Eigen::Vector3d(points.rowwise().mean())).normalized();
   if (sight.dot(T_camera_target.linear().col(2)) < std::cos(settings.steepest)) return false;
   const IntrinsicsVector intrinsics = to_vector(camera);
+  const double margin = settings.margin * camera.width;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const Eigen::Vector3d q = T_camera_target * points.col(i);
     if (!(q.z() > 0.02)) return false;
     const Eigen::Vector2d px = project(intrinsics, q);
-    if (px.minCoeff() < settings.margin_px || px.x() > camera.width - settings.margin_px ||
-        px.y() > camera.height - settings.margin_px)
+    if (px.minCoeff() < margin || px.x() > camera.width - margin ||
+        px.y() > camera.height - margin)
       return false;
   }
   return true;
 }
 
 /// What one more view tells of the shared unknowns: its corners, with its robot pose known to its noise.
-Eigen::MatrixXd view_information(Bundle bundle, const Eigen::Isometry3d& T_base_gripper,
-                                 const Eigen::Matrix3Xd& points, const NoiseLevels& noise,
-                                 const Unknowns& unknowns, const SharedColumns& columns) {
-  RobotPose pose;
-  pose.T_base_gripper = T_base_gripper;
-  bundle.poses = {pose};
-  BundleView view;
-  view.points = points;
-  view.bows = Bows::Zero(kWarp, points.cols());
-  view.pixels = Eigen::Matrix2Xd::Zero(2, points.cols());
+/// scene: without poses and views; view: what is seen of the target, its pixels of no account, as only
+/// derivatives of residuals count.
+Eigen::MatrixXd view_information(Bundle& scene, const Eigen::Isometry3d& T_base_gripper,
+                                 const BundleView& view, const NoiseLevels& noise, const Unknowns& unknowns,
+                                 const SharedColumns& columns) {
+  scene.poses.front().T_base_gripper = T_base_gripper;
   double count = 0;
-  // The residual of these pixels is of no account: only its derivatives are.
-  const Eigen::MatrixXd gram = corner_gram(bundle, view, unknowns, columns, noise.corner.front(), 0, count) /
+  const Eigen::MatrixXd gram = corner_gram(scene, view, unknowns, columns, noise.corner.front(), 0, count) /
                                (noise.corner.front() * noise.corner.front());
   const int s = columns.count;
   Matrix6d own = gram.topLeftCorner<6, 6>();
@@ -86,7 +82,7 @@ std::optional<Eigen::Vector3d> only_axis(const Calibration& calibration, const P
 Eigen::MatrixXd information_of(const Calibration& calibration, const SharedColumns& columns, double loose,
                                const PlanSettings& settings) {
   Eigen::MatrixXd information =
-      calibration.refined.covariance.topLeftCorner(columns.count, columns.count).inverse();
+      calibration.refined.covariance.ldlt().solve(Eigen::MatrixXd::Identity(columns.count, columns.count));
   const std::optional<AlongPrior>& held = calibration.refined.bundle.priors.along;
   if (!held || !calibration.along || calibration.along->told || settings.one_axis) return information;
   const int first = (held->target ? columns.targets : columns.cameras).front();
@@ -96,8 +92,42 @@ Eigen::MatrixXd information_of(const Calibration& calibration, const SharedColum
   return information;
 }
 
-std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const std::optional<Eigen::Vector3d>& axis,
+/// Where in the camera's frame the middle of the target may be.
+struct Sight {
+  Eigen::Vector3d middle;     // of the target, in its frame
+  double nearest, farthest;   // as the views so far, and `reach` beyond [m]
+  Eigen::Vector2d across;     // half of the picture, tangents
+};
+
+Sight sight_of(const Calibration& calibration, const Eigen::Matrix3Xd& points, const PlanSettings& settings) {
+  const Bundle& bundle = calibration.refined.bundle;
+  const data::CameraIntrinsics& camera = bundle.intrinsics.front();
+  Sight sight{.middle = points.rowwise().mean(),
+              .nearest = std::numeric_limits<double>::infinity(),
+              .farthest = 0,
+              .across = {0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy}};
+  for (const BundleView& view : bundle.views) {
+    const double distance = (predicted_pose(bundle, view) * sight.middle).z();
+    sight.nearest = std::min(sight.nearest, distance);
+    sight.farthest = std::max(sight.farthest, distance);
+  }
+  sight.nearest = std::max(0.5 * sight.nearest, sight.nearest - settings.reach);
+  sight.farthest += settings.reach;
+  return sight;
+}
+
+/// Where a gripper of that orientation is while the camera sees `middle` of the target at `place`.
+Eigen::Vector3d looking_from(const Calibration& calibration, const Eigen::Matrix3d& orientation,
+                             const Eigen::Vector3d& place, const Eigen::Vector3d& middle) {
+  const Eigen::Vector3d seen = calibration.poses.X * place, held = calibration.poses.Z * middle;
+  return calibration.setup == Setup::eye_in_hand ? Eigen::Vector3d(held - orientation * seen)
+                                                 : Eigen::Vector3d(seen - orientation * held);
+}
+
+std::vector<Eigen::Isometry3d> draw_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
+                                          const std::optional<Eigen::Vector3d>& axis,
                                           const PlanSettings& settings) {
+  const Bundle& bundle = calibration.refined.bundle;
   Eigen::Vector3d lower = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
   std::vector<Eigen::Isometry3d> used;
   for (const RobotPose& pose : bundle.poses) {
@@ -121,23 +151,31 @@ std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const std::optio
                              " m; --reach says how far beyond them");
   lower = lower.cwiseMax(settings.lower);
   upper = upper.cwiseMin(settings.upper);
+  const Sight sight = sight_of(calibration, points, settings);
   const Eigen::Matrix3d mean = mean_pose(used).linear();
   std::mt19937 random(settings.seed);
   std::uniform_real_distribution<double> uniform(0, 1);
+  const auto between = [&](double low, double high) { return low + (high - low) * uniform(random); };
   std::vector<Eigen::Isometry3d> poses;
   for (int i = 0; i < settings.candidates; ++i) {
     Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-    for (int k = 0; k < 3; ++k) T.translation()[k] = lower[k] + (upper[k] - lower[k]) * uniform(random);
     // Half from views that are known to work, turned; half from their mean orientation.
     const auto from = static_cast<std::size_t>(uniform(random) * static_cast<double>(used.size()));
     const double heading = 2 * M_PI * uniform(random), tilt = settings.tilt * std::sqrt(uniform(random));
-    const double turn = settings.turn * (2 * uniform(random) - 1);
+    const double turn = between(-settings.turn, settings.turn);
     const Eigen::Matrix3d& start = i % 2 == 0 ? mean : used[from].linear();
     if (axis)
       T.linear() = start * rotation_exp(turn * *axis);
     else
       T.linear() = start * rotation_exp({tilt * std::cos(heading), tilt * std::sin(heading), 0}) *
                    rotation_exp({0, 0, turn});
+    // There where the middle of the target is seen at some place of the picture, at some distance.
+    const double distance = between(sight.nearest, sight.farthest);
+    const Eigen::Vector3d place(distance * between(-sight.across.x(), sight.across.x()),
+                                distance * between(-sight.across.y(), sight.across.y()), distance);
+    T.translation() = looking_from(calibration, T.linear(), place, sight.middle);
+    if ((T.translation() - lower).minCoeff() < 0 || (upper - T.translation()).minCoeff() < 0)
+      for (int k = 0; k < 3; ++k) T.translation()[k] = between(lower[k], upper[k]);
     poses.push_back(T);
   }
   return poses;
@@ -149,15 +187,23 @@ Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
                 const PlanSettings& settings) {
   const Bundle& bundle = calibration.refined.bundle;
   const NoiseLevels& noise = calibration.refined.noise;
-  const Unknowns unknowns;  // lens, sizes and times as they are
+  const Unknowns& unknowns = calibration.unknowns;
   const SharedColumns columns = shared_columns(bundle, unknowns);
+  Bundle scene = bundle;
+  scene.poses.assign(1, RobotPose{});
+  scene.views.clear();
+  BundleView view;
+  view.points = points;
+  view.pixels.setZero(2, points.cols());
+  view.bows = target_bows(points);
   std::vector<Candidate> candidates;
-  for (const Eigen::Isometry3d& T : draw_poses(bundle, only_axis(calibration, settings), settings)) {
+  for (const Eigen::Isometry3d& T :
+       draw_poses(calibration, points, only_axis(calibration, settings), settings)) {
     const PoseLoop loop = pose_loop(bundle.setup, T, Eigen::Isometry3d::Identity());
     const Eigen::Isometry3d T_camera_target =
         calibration.poses.X.inverse() * loop.G.inverse() * calibration.poses.Z;
     if (!visible(T_camera_target, bundle.intrinsics.front(), points, settings)) continue;
-    candidates.push_back({T, view_information(bundle, T, points, noise, unknowns, columns)});
+    candidates.push_back({T, view_information(scene, T, view, noise, unknowns, columns)});
   }
   if (candidates.empty())
     throw data::InputError("plan: of " + std::to_string(settings.candidates) +

@@ -19,13 +19,13 @@ struct PlanSettings {
   Eigen::Vector3d upper = Eigen::Vector3d::Constant(1e9);
   double reach =
       0.10;  ///< how far beyond the box of the poses already used candidates go, where bounds allow [m]
-  double tilt = 0.6;  ///< of the gripper from the mean orientation, at most [rad]
-  double turn = 1.2;  ///< about its axis from the mean orientation, at most [rad]
-  bool one_axis =
-      false;  ///< of an arm that cannot tilt: turns about its axis alone, the place along it aside
-  double margin_px = 20;  ///< of the target's points from the edge of the picture
+  double tilt = 0.6;      ///< of the gripper from the mean orientation, at most [rad]
+  double turn = 1.2;      ///< about its axis from the mean orientation, at most [rad]
+  /// Of an arm that cannot tilt: turns about its axis alone, the place along it aside.
+  bool one_axis = false;
+  double margin = 0.05;   ///< of the target's points from the edge of the picture, as a share of its width
   double steepest = 1.1;  ///< angle between line of sight and the target's normal, at most [rad]
-  int candidates = 2000;
+  int candidates = 600;
   unsigned seed = 1;
 };
 
