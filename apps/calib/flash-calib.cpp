@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   flash::add_handeye_verb(app, action);
   flash::add_register_verb(app, action);
   flash::add_plan_verb(app, action);
+  flash::add_watch_verb(app, action);
   flash::add_export_verb(app, action);
   return flash::run_tool(app, argc, argv, [&] { return action(); });
 }

@@ -338,9 +338,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<HandEyeOptions>();
   CLI::App* verb = app.add_subcommand("handeye", "Where the camera sits, in the hand or before the robot");
   add_dataset_options(*verb, options->dataset);
-  verb->add_option("--setup", options->setup,
-                   "Camera on the gripper, or beside the robot that holds the target")
-      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+  add_setup_option(*verb, options->setup);
   verb->add_option_function<std::string>(
           "--for", [options](const std::string& name) { options->use = *calib::use_named(name); },
           "What the answer is for. workspace: places seen by the camera, in the robot's frame; "

@@ -98,7 +98,37 @@ void expect_no_camera(const LensOption& lens, const std::string& camera) {
                            camera);
 }
 
-calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {
+void add_setup_option(CLI::App& verb, std::string& setup) {
+  verb.add_option("--setup", setup, "Camera on the gripper, or beside the robot that holds the target")
+      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+}
+
+void add_plan_bounds(CLI::App& verb, PlanBounds& bounds) {
+  add_vector_option(verb, "--lower", bounds.lower, "Least x,y,z of the gripper in the base [m]");
+  add_vector_option(verb, "--upper", bounds.upper, "Greatest x,y,z of the gripper in the base [m]");
+  verb.add_option("--reach", bounds.reach, "How far beyond the poses used, where the bounds allow [m]")
+      ->check(number_between(0, 10))
+      ->capture_default_str();
+  verb.add_flag("--four-axes", bounds.four_axes,
+                "Of an arm that turns about one axis alone: poses that it can take");
+}
+
+calib::PlanSettings plan_settings(const PlanBounds& bounds) {
+  if (!bounds.lower.empty() && !bounds.upper.empty())
+    for (std::size_t k = 0; k < 3; ++k)
+      if (bounds.lower[k] > bounds.upper[k])
+        throw data::InputError("--lower: found " + data::format_short(bounds.lower[k]) + " along " +
+                               "xyz"[k] + ", expected at most --upper, " +
+                               data::format_short(bounds.upper[k]));
+  calib::PlanSettings settings;
+  if (!bounds.lower.empty()) settings.lower = Eigen::Vector3d::Map(bounds.lower.data());
+  if (!bounds.upper.empty()) settings.upper = Eigen::Vector3d::Map(bounds.upper.data());
+  settings.reach = bounds.reach;
+  settings.one_axis = bounds.four_axes;
+  return settings;
+}
+
+calib::DatasetOptions dataset_options(const DatasetChoice& choice) {
   calib::DatasetOptions options;
   options.poses = choice.poses;
   options.camera = choice.camera;
@@ -106,10 +136,15 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool 
   options.robot = choice.robot;
   options.base_link = choice.base_link;
   options.tip_link = choice.tip_link;
-  options.needs_poses = needs_poses;
-  options.needs_camera = needs_camera;
   options.depth_scale = choice.depth_scale;
   options.depth = !choice.no_depth;
+  return options;
+}
+
+calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {
+  calib::DatasetOptions options = dataset_options(choice);
+  options.needs_poses = needs_poses;
+  options.needs_camera = needs_camera;
   calib::Dataset dataset = calib::load_dataset(choice.path, options);
   calib::take_picture_size(dataset);
   for (const std::string& guess : dataset.guesses) warn_calib(guess);
@@ -166,10 +201,12 @@ void expect_pictures(const calib::Dataset& dataset) {
     throw data::InputError(dataset.source + ": found pairs of poses, expected pictures of the target");
 }
 
+calib::Target target_named(const std::string& text) {
+  return std::filesystem::exists(text) ? calib::load_target(text) : calib::parse_target(text);
+}
+
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset) {
-  if (!choice.target.empty())
-    return std::filesystem::exists(choice.target) ? calib::load_target(choice.target)
-                                                  : calib::parse_target(choice.target);
+  if (!choice.target.empty()) return target_named(choice.target);
   expect_pictures(dataset);
   if (dataset.target.empty())
     throw data::InputError(dataset.source + ": names no target; add one, as --target chessboard:9x6:0.025");

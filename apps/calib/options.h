@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/calibrate/next_poses.h"
 #include "calib/dataset/dataset.h"
 #include "calib/dataset/detection.h"
 #include "calib/dataset/target.h"
@@ -53,6 +54,20 @@ void add_lens_option(CLI::App& verb, LensOption& lens);
 /// Throws data::InputError where --lens and --camera both name a file.
 void expect_no_camera(const LensOption& lens, const std::string& camera);
 
+/// --setup, for datasets that do not say it.
+void add_setup_option(CLI::App& verb, std::string& setup);
+
+/// --lower, --upper, --reach: where the robot may go.
+struct PlanBounds {
+  std::vector<double> lower = {}, upper = {};
+  double reach = calib::PlanSettings{}.reach;
+  bool four_axes = false;  ///< see calib::PlanSettings::one_axis
+};
+void add_plan_bounds(CLI::App& verb, PlanBounds& bounds);
+/// Throws data::InputError where --lower is above --upper.
+calib::PlanSettings plan_settings(const PlanBounds& bounds);
+
+calib::DatasetOptions dataset_options(const DatasetChoice& choice);
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
 
 /// The file of options, empty where there is none.
@@ -67,6 +82,9 @@ void expect_no_picture_options(const CLI::App& verb, const calib::Dataset& datas
 
 /// Throws data::InputError where the dataset is pairs of poses.
 void expect_pictures(const calib::Dataset& dataset);
+
+/// The target that a file or a text of --target says.
+calib::Target target_named(const std::string& text);
 
 /// The target of the command line or, without one, of the dataset. Throws data::InputError where neither
 /// names one.

@@ -26,8 +26,9 @@ struct PlanOptions {
   CalibCommonOptions common;
   DatasetChoice dataset;
   std::string setup, criterion = "trace";
-  std::vector<double> lower, upper;
-  calib::PlanSettings settings;
+  PlanBounds bounds;
+  int count = calib::PlanSettings{}.poses;
+  unsigned seed = calib::PlanSettings{}.seed;
   std::string out;
 };
 
@@ -63,16 +64,11 @@ void print(const calib::Plan& plan) {
   }
 }
 
-void expect_bounds(const PlanOptions& options) {
-  if (options.lower.empty() || options.upper.empty()) return;
-  for (std::size_t k = 0; k < 3; ++k)
-    if (options.lower[k] > options.upper[k])
-      throw data::InputError("--lower: found " + data::format_short(options.lower[k]) + " along " + "xyz"[k] +
-                             ", expected at most --upper, " + data::format_short(options.upper[k]));
-}
-
 int run_plan(const PlanOptions& options) {
-  expect_bounds(options);
+  calib::PlanSettings settings = plan_settings(options.bounds);
+  settings.poses = options.count;
+  settings.seed = options.seed;
+  if (options.criterion == "determinant") settings.criterion = calib::PlanCriterion::determinant;
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   const calib::Dataset dataset = load_dataset(options.dataset);
   expect_own_files({options.out}, files_read(options.dataset, dataset, options.common));
@@ -89,10 +85,6 @@ int run_plan(const PlanOptions& options) {
   calibrate.threads = options.common.threads;
   const calib::ImageCalibration solved = calib::calibrate_images(
       setup, dataset, target, detections, calib::read_depth(dataset, detections), calibrate);
-  calib::PlanSettings settings = options.settings;
-  if (options.criterion == "determinant") settings.criterion = calib::PlanCriterion::determinant;
-  if (!options.lower.empty()) settings.lower = Eigen::Vector3d::Map(options.lower.data());
-  if (!options.upper.empty()) settings.upper = Eigen::Vector3d::Map(options.upper.data());
   const calib::Plan plan = calib::plan_poses(solved.calibration, calib::target_points(target), settings);
   for (const std::string& warning : solved.calibration.warnings) warn_calib(warning);
   const std::string text = data::format_json(plan_json(plan, options));
@@ -111,24 +103,16 @@ void add_plan_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<PlanOptions>();
   CLI::App* verb = app.add_subcommand("plan", "The next robot poses that would help the calibration most");
   add_dataset_options(*verb, options->dataset);
-  verb->add_option("--setup", options->setup, "eye-in-hand or eye-to-hand, where the dataset does not say")
-      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
-  verb->add_option("--count", options->settings.poses, "Number of poses to propose")
+  add_setup_option(*verb, options->setup);
+  verb->add_option("--count", options->count, "Number of poses to propose")
       ->check(whole_number(1, 100))
       ->capture_default_str();
-  add_vector_option(*verb, "--lower", options->lower, "Least x,y,z of the gripper in the base [m]");
-  add_vector_option(*verb, "--upper", options->upper, "Greatest x,y,z of the gripper in the base [m]");
-  verb->add_option("--reach", options->settings.reach,
-                   "How far beyond the poses used, where the bounds allow [m]")
-      ->check(number_between(0, 10))
-      ->capture_default_str();
-  verb->add_flag("--four-axes", options->settings.one_axis,
-                 "Of an arm that turns about one axis alone: poses that it can take");
+  add_plan_bounds(*verb, options->bounds);
   verb->add_option("--criterion", options->criterion,
                    "trace: sum of variances; determinant: volume of the region")
       ->check(CLI::IsMember({"trace", "determinant"}))
       ->capture_default_str();
-  verb->add_option("--seed", options->settings.seed, "Random seed of the candidate poses")
+  verb->add_option("--seed", options->seed, "Random seed of the candidate poses")
       ->check(whole_number(0, 1'000'000'000))
       ->capture_default_str();
   verb->add_flag("--no-depth", options->dataset.no_depth, "Leave depth pictures out");

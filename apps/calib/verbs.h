@@ -17,6 +17,7 @@ void add_validate_verb(CLI::App& app, Action& action);
 void add_handeye_verb(CLI::App& app, Action& action);
 void add_register_verb(CLI::App& app, Action& action);
 void add_plan_verb(CLI::App& app, Action& action);
+void add_watch_verb(CLI::App& app, Action& action);
 void add_export_verb(CLI::App& app, Action& action);
 
 }  // namespace flash

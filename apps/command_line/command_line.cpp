@@ -46,6 +46,12 @@ void ask_to_stop(int signal) {
   errno = before;
 }
 
+std::atomic<bool> end_asked = false;
+
+void ask_to_end(int signal) {
+  if (end_asked.exchange(true)) _exit(128 + signal);
+}
+
 constexpr std::string_view kTimeOver = "\nthe time of --max-hours is over: stopping after this step\n";
 
 void stop_as_time_is_over(int /*signal*/) {
@@ -353,6 +359,11 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
 const std::atomic<bool>& stop_on_signals() {
   handle_signals(ask_to_stop);
   return stop_asked;
+}
+
+const std::atomic<bool>& end_on_signals() {
+  handle_signals(ask_to_end);
+  return end_asked;
 }
 
 void stop_after(double hours) {

@@ -30,6 +30,11 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
 /// stops after the step in work. A second signal ends the program there, with the exit code 128 + signal.
 const std::atomic<bool>& stop_on_signals();
 
+/// For a body that goes on until it is told to end: from now on Ctrl-C and SIGTERM set the flag that this
+/// returns, in silence, and the exit code is that of the body. A second signal ends the program there, with the
+/// exit code 128 + signal.
+const std::atomic<bool>& end_on_signals();
+
 /// So many hours from now the flag of stop_on_signals is set, with a line on stderr, as after a signal.
 void stop_after(double hours);
 

@@ -64,7 +64,21 @@ void add_poses(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& poi
                            : "the corners fit no pose of the target";
 }
 
-/// A view that fits far worse than the others of its set shows wrong corners.
+/// What was found in a picture, with the poses that fit it where there are intrinsics.
+Detection detection_of(const Frame& frame, const Found& found, const Dataset& dataset, const Target& target,
+                       const Eigen::Matrix3Xd& points, const DetectSettings& settings) {
+  Detection detection;
+  detection.image = frame.name;
+  detection.reason = found.reason;
+  for (const Sighting& sighting : found.sightings)
+    detection.readings.push_back({sighting.refiner, observe(frame, target, sighting)});
+  if (dataset.camera && detection.reason.empty())
+    add_poses(*dataset.camera, points, settings.largest_rms, detection);
+  return detection;
+}
+
+}  // namespace
+
 void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detections) {
   std::vector<double> rms;
   for (const Detection& detection : detections)
@@ -84,6 +98,8 @@ void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detect
                   [&](const CornerReading& reading) { return reading.observation.pose_rms > limit; });
   }
 }
+
+namespace {
 
 /// Width and height of the first picture that can be read.
 std::pair<int, int> picture_size(const Dataset& dataset) {
@@ -142,14 +158,7 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
   const std::vector<Found> found = find_in_all(dataset, target, rectifier, settings, progress);
   std::vector<Detection> detections(found.size());
   data::for_each_in_parallel(found.size(), settings.threads, [&](std::size_t k) {
-    const Frame& frame = dataset.frames[k];
-    Detection& detection = detections[k];
-    detection.image = frame.name;
-    detection.reason = found[k].reason;
-    for (const Sighting& sighting : found[k].sightings)
-      detection.readings.push_back({sighting.refiner, observe(frame, target, sighting)});
-    if (dataset.camera && detection.reason.empty())
-      add_poses(*dataset.camera, points, settings.largest_rms, detection);
+    detections[k] = detection_of(dataset.frames[k], found[k], dataset, target, points, settings);
   });
 
   drop_misfits(settings, detections);
@@ -165,6 +174,23 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
                            std::to_string(found.size()) + " pictures" +
                            (found.empty() ? "" : "; " + detections[0].image + ": " + detections[0].reason));
   return detections;
+}
+
+Detection detect_one(const Frame& frame, const Dataset& dataset, const Target& target,
+                     const DetectSettings& settings) {
+  Dataset alone = dataset;
+  alone.frames = {frame};
+  try {
+    const Rectifier rectifier = make_rectifier(alone);
+    const Found found = find_in_all(alone, target, rectifier, settings, {}).front();
+    Detection detection = detection_of(frame, found, alone, target, target_points(target), settings);
+    const std::string shown =
+        found.sightings.empty() ? shown_instead(alone, target, rectifier) : std::string();
+    if (!shown.empty()) detection.reason = "shows another target: --target " + shown;
+    return detection;
+  } catch (const data::InputError& error) {
+    return {.image = frame.name, .reason = error.what(), .readings = {}};
+  }
 }
 
 }  // namespace flash::calib

@@ -24,6 +24,15 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target,
                               const DetectSettings& settings = {},
                               const std::function<void(int, int)>& progress = {});
 
+/// The same for one picture, whatever the others show; `dataset` without regard to its frames. What is wrong
+/// with the picture is the reason.
+Detection detect_one(const Frame& frame, const Dataset& dataset, const Target& target,
+                     const DetectSettings& settings = {});
+
+/// Empties the detections that fit far worse than the usual one of the set, and says why: they show wrong
+/// corners. detect() has done so.
+void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detections);
+
 /// Where the intrinsics say nothing of the size of the pictures, that of the first one that can be read; said
 /// among the guesses.
 void take_picture_size(Dataset& dataset);
