@@ -35,16 +35,16 @@ void expect_one_camera(const std::string& folder) {
   if (recordings.empty()) return;
   std::string names;
   for (const std::string& name : recordings) names += (names.empty() ? "" : ", ") + name;
-  throw data::InputError(folder + ": found the recordings of cameras in " + names +
-                         ", expected one of them: " + (std::filesystem::path(folder) / recordings.front()).string());
+  throw data::InputError(
+      folder + ": found the recordings of cameras in " + names +
+      ", expected one of them: " + (std::filesystem::path(folder) / recordings.front()).string());
 }
 
 calib::WatchSettings settings_of(const WatchOptions& options) {
   calib::WatchSettings settings;
   settings.folder = std::filesystem::path(options.dataset.path).lexically_normal().string();
   settings.dataset = dataset_options(options.dataset);
-  if (!options.setup.empty())
-    settings.setup = calib::parse_setup(options.setup, "command line", "--setup");
+  if (!options.setup.empty()) settings.setup = calib::parse_setup(options.setup, "command line", "--setup");
   if (!options.dataset.target.empty()) settings.target = target_named(options.dataset.target);
   settings.detect.threads = 1;
   settings.detect.cache = options.dataset.cache;
@@ -66,7 +66,8 @@ int run_watch(WatchOptions options) {
   const std::atomic<bool>& stop = end_on_signals();
   const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/";
   if (options.common.json)
-    std::cout << nlohmann::ordered_json{{"schema", "flash-watch-address/1"}, {"address", address}}.dump(2) << std::endl;
+    std::cout << nlohmann::ordered_json{{"schema", "flash-watch-address/1"}, {"address", address}}.dump(2)
+              << std::endl;
   else
     std::cout << "watching " << settings.folder << " at " << address << " (Ctrl-C ends it)" << std::endl;
   calib::watch_folder(settings, stop, [&](calib::WatchMoment moment) {

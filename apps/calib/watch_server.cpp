@@ -55,6 +55,7 @@ WatchServer::WatchServer(std::string page, int port) : served_(std::make_unique<
   server.set_socket_options(reuse_closed_port);
   server.set_tcp_nodelay(true);
   server.set_read_timeout(5);
+  server.set_keep_alive_timeout(1);  // of an idle page: the program does not end before
   server.set_payload_max_length(1024);
   server.set_default_headers(
       {{"Cache-Control", "no-store"},

@@ -31,8 +31,8 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
 const std::atomic<bool>& stop_on_signals();
 
 /// For a body that goes on until it is told to end: from now on Ctrl-C and SIGTERM set the flag that this
-/// returns, in silence, and the exit code is that of the body. A second signal ends the program there, with the
-/// exit code 128 + signal.
+/// returns, in silence, and the exit code is that of the body. A second signal ends the program there, with
+/// the exit code 128 + signal.
 const std::atomic<bool>& end_on_signals();
 
 /// So many hours from now the flag of stop_on_signals is set, with a line on stderr, as after a signal.

@@ -32,8 +32,7 @@ bool visible(const Eigen::Isometry3d& T_camera_target, const data::CameraIntrins
     const Eigen::Vector3d q = T_camera_target * points.col(i);
     if (!(q.z() > 0.02)) return false;
     const Eigen::Vector2d px = project(intrinsics, q);
-    if (px.minCoeff() < margin || px.x() > camera.width - margin ||
-        px.y() > camera.height - margin)
+    if (px.minCoeff() < margin || px.x() > camera.width - margin || px.y() > camera.height - margin)
       return false;
   }
   return true;
@@ -94,9 +93,9 @@ Eigen::MatrixXd information_of(const Calibration& calibration, const SharedColum
 
 /// Where in the camera's frame the middle of the target may be.
 struct Sight {
-  Eigen::Vector3d middle;     // of the target, in its frame
-  double nearest, farthest;   // as the views so far, and `reach` beyond [m]
-  Eigen::Vector2d across;     // half of the picture, tangents
+  Eigen::Vector3d middle;    // of the target, in its frame
+  double nearest, farthest;  // as the views so far, and `reach` beyond [m]
+  Eigen::Vector2d across;    // half of the picture, tangents
 };
 
 Sight sight_of(const Calibration& calibration, const Eigen::Matrix3Xd& points, const PlanSettings& settings) {

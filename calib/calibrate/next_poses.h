@@ -42,10 +42,11 @@ struct Plan {
 };
 
 /// Next poses, one after the other, each the candidate that lowers the predicted covariance of X most: the
-/// information of a view with the noise levels of the calibration, its robot correction marginalised, is
-/// added to what is there. Candidates are drawn around the poses used, kept within the bounds, and must see
-/// all of the target. A place along the axis of turns that is not told counts, unless no pose could tell it.
-/// Throws data::InputError where no candidate sees the target, and where an arm of one axis turned about two.
+/// information of a view about X and all else that was solved for (lens, size, warp), with the noise levels
+/// of the calibration and its robot correction marginalised, is added to what is there. Candidates are
+/// turned from the poses used and aimed at the target, are kept within the bounds, and must see all of the
+/// target. A place along the axis of turns that is not told counts, unless no pose could tell it. Throws
+/// data::InputError where no candidate sees the target, and where an arm of one axis turned about two.
 Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
                 const PlanSettings& settings = {});
 

@@ -47,7 +47,8 @@ std::string within(const std::string& folder, std::string sentence) {
   const std::string start = (fs::path(folder).lexically_normal() / "").string();
   for (std::size_t at = sentence.find(start); at != std::string::npos; at = sentence.find(start))
     sentence.erase(at, start.size());
-  return sentence;
+  const std::string own = fs::path(folder).lexically_normal().string() + ": ";
+  return sentence.starts_with(own) ? sentence.substr(own.size()) : sentence;
 }
 
 /// Pictures alone. False where there is nothing to look at yet.

@@ -27,7 +27,8 @@ std::vector<std::string> recordings_in(const std::string& folder) {
   if (has_pictures(folder)) return names;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-    if (entry.is_directory(error) && entry.path().filename() != "depth" && has_pictures(entry.path().string()))
+    if (entry.is_directory(error) && entry.path().filename() != "depth" &&
+        has_pictures(entry.path().string()))
       names.push_back(entry.path().filename().string());
   if (names.size() < 2) return {};
   std::sort(names.begin(), names.end());

@@ -10,8 +10,8 @@ namespace flash::calib {
 
 /// What a recording says so far.
 struct WatchAnswer {
-  std::size_t views = 0;   ///< that show the target and have a pose
-  std::string not_yet;     ///< why nothing can be solved, in one sentence; empty: there is a calibration
+  std::size_t views = 0;  ///< that show the target and have a pose
+  std::string not_yet;    ///< why nothing can be solved, in one sentence; empty: there is a calibration
   std::optional<Calibration> calibration = {};
   std::optional<PlannedPose> next = {};  ///< the first of `plan`
   std::string no_plan = {};              ///< why there is no next pose

@@ -142,10 +142,10 @@ class Follower {
     if (next == nullptr) return false;
     looking_at_ = next->image;
     look_is_of_ = revision();
-    looking_ = std::async(std::launch::async, [this, frame = *next, dataset = without_frames(set_.pictures),
-                                               target = *target_] {
-      return look_at(frame, dataset, target, settings_.detect);
-    });
+    looking_ = std::async(std::launch::async,
+                          [this, frame = *next, dataset = without_frames(set_.pictures), target = *target_] {
+                            return look_at(frame, dataset, target, settings_.detect);
+                          });
     return true;
   }
 

@@ -27,8 +27,12 @@ Json pixels(const Eigen::Matrix2Xd& places) {
 }
 
 Json to_json(const LastPicture& last) {
-  return {{"name", last.name},   {"looked_at", last.looked_at}, {"has_pose", last.has_pose},
-          {"found", last.found}, {"expected", last.expected},   {"reason", last.reason},
+  return {{"name", last.name},
+          {"looked_at", last.looked_at},
+          {"has_pose", last.has_pose},
+          {"found", last.found},
+          {"expected", last.expected},
+          {"reason", last.reason},
           {"corners_px", pixels(last.corners)}};
 }
 
@@ -78,18 +82,12 @@ Json to_json(const WatchAnswer& answer, const WatchState& state) {
 }  // namespace
 
 Json to_json(const WatchState& state) {
-  Json json = {{"schema", "flash-watch/1"},
-               {"width", state.width},
-               {"height", state.height},
-               {"pictures", state.pictures},
-               {"with_target", state.with_target},
-               {"with_pose", state.with_pose},
-               {"looking", state.looking},
-               {"solving", state.solving},
-               {"waiting", state.waiting},
-               {"notes", state.notes},
-               {"advice", state.advice},
-               {"weakest", state.weakest}};
+  Json json = {{"schema", "flash-watch/1"},        {"width", state.width},
+               {"height", state.height},           {"pictures", state.pictures},
+               {"with_target", state.with_target}, {"with_pose", state.with_pose},
+               {"looking", state.looking},         {"solving", state.solving},
+               {"waiting", state.waiting},         {"notes", state.notes},
+               {"advice", state.advice},           {"weakest", state.weakest}};
   json["last"] = state.last ? to_json(*state.last) : Json(nullptr);
   json["image"] = to_json(state.image);
   json["turns"] = to_json(state.turns);

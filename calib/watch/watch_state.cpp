@@ -87,7 +87,7 @@ TurnCoverage turn_coverage(const std::vector<Eigen::Isometry3d>& poses) {
     turns.sentence = formatted("turn more about %s: so far by %.0f deg rms",
                                axis_text(diversity.axes.col(1)).c_str(), turns.spread_deg.y());
   else
-    turns.sentence = "two axes are told apart";
+    turns.sentence = "turns about two axes are covered";
   return turns;
 }
 
@@ -139,10 +139,9 @@ std::string view_text(const Eigen::Isometry3d& T_camera_target, const Eigen::Vec
   constexpr const char* kPlaces[3][3] = {{"upper left", "upper middle", "upper right"},
                                          {"middle left", "middle", "middle right"},
                                          {"lower left", "lower middle", "lower right"}};
-  std::string text =
-      formatted("target in the %s of the picture, %.2f m away",
-                kPlaces[third(pixel.y(), camera.height)][third(pixel.x(), camera.width)],
-                (T_camera_target * middle).norm());
+  std::string text = formatted("target in the %s of the picture, %.2f m away",
+                               kPlaces[third(pixel.y(), camera.height)][third(pixel.x(), camera.width)],
+                               (T_camera_target * middle).norm());
   // Its plane comes nearer to where its normal, which points away from the camera, leans in the picture.
   const Eigen::Vector3d normal = T_camera_target.linear().col(2);
   const double tilt = kDegrees * std::acos(std::clamp(normal.z(), -1.0, 1.0));

@@ -12,8 +12,8 @@ namespace flash::calib {
 /// A picture of a recording as far as it was looked at.
 struct WatchedPicture {
   std::string name = {};
-  bool looked_at = false;    ///< else the target is being looked for
-  Detection detection = {};  ///< once it was
+  bool looked_at = false;                                ///< else the target is being looked for
+  Detection detection = {};                              ///< once it was
   std::optional<Eigen::Isometry3d> T_base_gripper = {};  ///< none: no pose yet
 };
 

@@ -51,8 +51,7 @@ std::optional<Observation> view_from(const HandEyeScene& scene, const Eigen::Iso
   std::normal_distribution<double> normal;
   Vector6d error;
   for (Eigen::Index k = 0; k < 6; ++k)
-    error[k] =
-        normal(random) * (k < 3 ? 1e-3 * scene.settings.robot_mm : kDegree * scene.settings.robot_deg);
+    error[k] = normal(random) * (k < 3 ? 1e-3 * scene.settings.robot_mm : kDegree * scene.settings.robot_deg);
   const Eigen::Isometry3d T_camera_target = target_in_camera(scene, moved(reported, error));
   Observation view;
   view.T_base_gripper = reported;
@@ -92,7 +91,7 @@ Cell make_cell(const SceneSettings& settings, const Eigen::Matrix3Xd& points, un
 
 struct Answer {
   std::size_t views = 0;
-  double mm = 0, deg = 0;                                   ///< stated, rms of three axes
+  double mm = 0, deg = 0;             ///< stated, rms of three axes
   Eigen::Vector3d away_mm, away_deg;  ///< from the truth
 };
 
@@ -107,8 +106,8 @@ std::optional<Calibration> solve(const HandEyeScene& scene, const std::vector<Ob
 Answer answer_of(const HandEyeScene& scene, const Calibration& result, std::size_t views) {
   const Vector6d away = motion_between(result.poses.X, scene.truth.X);
   return {views, 1e3 * std::sqrt(result.covariance.topLeftCorner<3, 3>().trace() / 3),
-          std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace() / 3) / kDegree,
-          1e3 * away.head<3>(), away.tail<3>() / kDegree};
+          std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace() / 3) / kDegree, 1e3 * away.head<3>(),
+          away.tail<3>() / kDegree};
 }
 
 /// Of one cell: the person after 20 views, and the follower after each.
@@ -191,10 +190,10 @@ void study(Setup setup, double deg, double mm, std::size_t seeds, unsigned first
     const auto in_deg = [&](const Answer& a) { return a.deg <= person.deg; };
     by_mm.push_back(first_view(course.follower, in_mm));
     by_deg.push_back(first_view(course.follower, in_deg));
-    by_both.push_back(
-        first_view(course.follower, [&](const Answer& a) { return in_mm(a) && in_deg(a); }));
+    by_both.push_back(first_view(course.follower, [&](const Answer& a) { return in_mm(a) && in_deg(a); }));
   }
-  std::printf("%s, robot %.2f deg %.1f mm, %zu seeds, %d views wasted\n", to_string(setup), deg, mm, seeds, wasted);
+  std::printf("%s, robot %.2f deg %.1f mm, %zu seeds, %d views wasted\n", to_string(setup), deg, mm, seeds,
+              wasted);
   std::printf("  views until as well known as by %zu random ones:", kRandom);
   for (const std::size_t views : by_both) std::printf(" %zu", views);
   std::printf("; median %.1f, %.0f %%; mm alone %.1f, deg alone %.1f\n", median(by_both),
