@@ -66,7 +66,7 @@ int run_watch(WatchOptions options) {
   const std::atomic<bool>& stop = end_on_signals();
   const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/";
   if (options.common.json)
-    std::cout << nlohmann::ordered_json{{"schema", "flash-watch-address/1"}, {"address", address}}.dump(2)
+    std::cout << nlohmann::ordered_json{{"schema", "flash-watch-address/1"}, {"address", address}}.dump()
               << std::endl;
   else
     std::cout << "watching " << settings.folder << " at " << address << " (Ctrl-C ends it)" << std::endl;

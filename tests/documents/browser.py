@@ -54,10 +54,11 @@ def program():
 
 
 def run(page, *options):
-    """stdout and stderr. Once in some hundred calls Chromium does not come to its end: then it is started anew."""
+    """stdout and stderr; page: a file or an address. Once in some hundred calls Chromium does not come to its end: then it is started anew."""
+    address = page if "://" in str(page) else pathlib.Path(page).resolve().as_uri()
     for _ in range(TRIES):
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-            words = [program(), *OPTIONS, f"--user-data-dir={profile}", *options, pathlib.Path(page).resolve().as_uri()]
+            words = [program(), *OPTIONS, f"--user-data-dir={profile}", *options, address]
             started = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace",
                                        start_new_session=True)
             try:
@@ -72,6 +73,17 @@ def run(page, *options):
     raise SystemExit(f"{page}: chromium did not end in {SECONDS} s, {TRIES} times")
 
 
+def console(err):
+    """Lines that a page logged, but for those of software rendering."""
+    return [line for line in err.splitlines() if "CONSOLE" in line and not any(word in line for word in HARMLESS)]
+
+
+def served(address):
+    """The elements of a page that a program serves, as they are once its scripts ran for a while, and what it logged."""
+    out, err = run(address, "--dump-dom", "--enable-logging=stderr", "--window-size=1280,1000")
+    return out, console(err)
+
+
 def probed(page):
     """What PROBE finds in the page, and "log": lines of its console."""
     with tempfile.TemporaryDirectory() as folder:
@@ -80,7 +92,7 @@ def probed(page):
         copy.write_text(text.replace("</body>", PROBE + "</body>"))
         out, err = run(copy, "--dump-dom", "--enable-logging=stderr", "--window-size=1280,1000")
     found = re.search(r'<script type="application/json" id="probe">(.*?)</script>', out, re.DOTALL)
-    log = [line for line in err.splitlines() if "CONSOLE" in line and not any(word in line for word in HARMLESS)]
+    log = console(err)
     if not found:
         raise SystemExit(f"{page}: its scripts did not come to their end: {log or err[-500:]}")
     return {**json.loads(found[1]), "log": log}

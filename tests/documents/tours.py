@@ -2,6 +2,7 @@
 """Runs the commands of a tour, block by block, where `make cell` or `make demo` left its recording. Each prints what stands in the
 ```text below it, numbers to a tenth, and ends with 0, or with the exit code that the text behind it names."""
 import argparse
+import json
 import os
 import pathlib
 import re
@@ -9,6 +10,8 @@ import shlex
 import shutil
 import subprocess
 import sys
+import time
+import urllib.request
 
 import browser
 import commands
@@ -23,6 +26,7 @@ PICTURES = {
         "cell_size.png": ("demo/cell/size.html", 1180, 560, ""),
         "cell_slip.png": ("demo/cell/slip.html", 1180, 500, ONLY("pictures-section")),
         "cell_knock.png": ("demo/cell/knock.html", 1180, 560, ""),
+        "watch.png": ("flash-calib watch demo/cell/growing", 1180, 1060, ""),
     },
     "identify_a_towel.md": {
         "towel_segment.png": ("demo/segmented/segment.svg", 1856, 723, ""),
@@ -112,9 +116,26 @@ def run(page, out, path):
         yield f"{page}: no block ```{commands.RUN}"
 
 
-def draw_pictures(page, out, images):
+def draw_watch(words, out, path, picture, size):
+    """The page that the words serve, once it has answered: the first eight pictures of demo/cell/wrist."""
+    growing = out / words[-1]
+    shutil.copytree(out / "demo/cell/wrist", growing, ignore=lambda _, names: [n for n in names if n > "007.png" and n.endswith(".png")])
+    with subprocess.Popen([path / words[0], *words[1:], "--port", "0"], cwd=out, stdout=subprocess.PIPE, text=True) as served:
+        address = re.search(r"http://\S+/", served.stdout.readline())[0]
+        state = {}
+        while not state or state["looking"] or state["solving"] or not state["answer"]:
+            time.sleep(0.2)
+            with urllib.request.urlopen(address + "state") as reply:
+                state = json.load(reply)["state"]
+        browser.picture(address, picture, *size)
+        served.terminate()
+
+
+def draw_pictures(page, out, images, path):
     for name, (shown, width, height, script) in PICTURES.get(page, {}).items():
-        if shown.endswith(".png"):
+        if shown.startswith("flash-calib watch "):
+            draw_watch(shown.split(), out, path, images / name, (width, height))
+        elif shown.endswith(".png"):
             shutil.copyfile(out / shown, images / name)
         else:
             browser.picture(out / shown, images / name, width, height, script)
@@ -138,7 +159,7 @@ def main():
     if wrong:
         sys.exit("\n\n".join(wrong))
     for page in options.pages if options.images else []:
-        draw_pictures(page, out, options.images)
+        draw_pictures(page, out, options.images, options.bin.resolve())
     print(f"{', '.join(options.pages)}: every command does what the page says")
 
 

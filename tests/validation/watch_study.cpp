@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kDegree = M_PI / 180;
 constexpr std::size_t kRandom = 20;  ///< views of the person
+constexpr std::size_t kLast = 14;    ///< of the follower
 constexpr std::size_t kFirst = 4;    ///< that both have in common
 
 /// Where the arm goes: a box around the places from which the target is seen, and how far it turns.
@@ -91,7 +92,8 @@ Cell make_cell(const SceneSettings& settings, const Eigen::Matrix3Xd& points, un
 
 struct Answer {
   std::size_t views = 0;
-  double mm = 0, deg = 0;             ///< stated, rms of three axes
+  double mm = 0, deg = 0;                  ///< stated, rms of three axes
+  double scatter_mm = 0, scatter_deg = 0;  ///< of these, what another recording in such poses differs by
   Eigen::Vector3d away_mm, away_deg;  ///< from the truth
 };
 
@@ -105,8 +107,16 @@ std::optional<Calibration> solve(const HandEyeScene& scene, const std::vector<Ob
 
 Answer answer_of(const HandEyeScene& scene, const Calibration& result, std::size_t views) {
   const Vector6d away = motion_between(result.poses.X, scene.truth.X);
-  return {views, 1e3 * std::sqrt(result.covariance.topLeftCorner<3, 3>().trace() / 3),
-          std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace() / 3) / kDegree, 1e3 * away.head<3>(),
+  const auto mm = [](const Matrix6d& c) { return 1e3 * std::sqrt(c.topLeftCorner<3, 3>().trace() / 3); };
+  const auto deg = [](const Matrix6d& c) {
+    return std::sqrt(c.bottomRightCorner<3, 3>().trace() / 3) / kDegree;
+  };
+  return {views,
+          mm(result.covariance),
+          deg(result.covariance),
+          mm(result.repeatable),
+          deg(result.repeatable),
+          1e3 * away.head<3>(),
           away.tail<3>() / kDegree};
 }
 
@@ -126,13 +136,14 @@ Course run(const Cell& cell, unsigned seed) {
   if (const auto result = solve(scene, views)) course.person = answer_of(scene, *result, kRandom);
   views.resize(kFirst);
   std::size_t drawn = kFirst;
-  for (std::size_t taken = kFirst; taken <= kRandom; ++taken) {
+  for (std::size_t taken = kFirst; taken <= kLast; ++taken) {
     const std::optional<Calibration> result = solve(scene, views);
     if (result) course.follower.push_back(answer_of(scene, *result, taken));
     std::optional<Observation> next;
     if (result) {
       PlanSettings settings = cell.plan;
       settings.seed = static_cast<unsigned>(taken);
+      if (std::getenv("DET")) settings.criterion = PlanCriterion::determinant;
       const Plan plan = plan_poses(*result, scene.points, settings);
       // People come near to a pose: 5 mm and 1 degree an axis.
       Vector6d off;
@@ -150,7 +161,7 @@ Course run(const Cell& cell, unsigned seed) {
 /// Of the follower, the first view from which on `good` holds; one more than were taken where it never does.
 template <class Good>
 std::size_t first_view(const std::vector<Answer>& answers, const Good& good) {
-  std::size_t views = kRandom + 1;
+  std::size_t views = kLast + 1;
   for (auto answer = answers.rbegin(); answer != answers.rend() && good(*answer); ++answer)
     views = answer->views;
   return views;
@@ -180,42 +191,47 @@ void study(Setup setup, double deg, double mm, std::size_t seeds, unsigned first
     const unsigned seed = first_seed + static_cast<unsigned>(i);
     courses[i] = run(make_cell(settings, points, seed), seed);
   });
-  std::vector<std::size_t> by_mm, by_deg, by_both;
   int wasted = 0;
-  for (const Course& course : courses) {
-    wasted += course.wasted;
-    if (!course.person) continue;
-    const Answer& person = *course.person;
-    const auto in_mm = [&](const Answer& a) { return a.mm <= person.mm; };
-    const auto in_deg = [&](const Answer& a) { return a.deg <= person.deg; };
-    by_mm.push_back(first_view(course.follower, in_mm));
-    by_deg.push_back(first_view(course.follower, in_deg));
-    by_both.push_back(first_view(course.follower, [&](const Answer& a) { return in_mm(a) && in_deg(a); }));
-  }
+  for (const Course& course : courses) wasted += course.wasted;
   std::printf("%s, robot %.2f deg %.1f mm, %zu seeds, %d views wasted\n", to_string(setup), deg, mm, seeds,
               wasted);
-  std::printf("  views until as well known as by %zu random ones:", kRandom);
-  for (const std::size_t views : by_both) std::printf(" %zu", views);
-  std::printf("; median %.1f, %.0f %%; mm alone %.1f, deg alone %.1f\n", median(by_both),
-              100 * median(by_both) / static_cast<double>(kRandom), median(by_mm), median(by_deg));
+  const auto tell = [&](const char* what, double Answer::*number) {
+    std::vector<std::size_t> needed;
+    std::printf("  views until known as by %zu random ones, %s:", kRandom, what);
+    for (const Course& course : courses) {
+      if (!course.person) continue;
+      const double wanted = (*course.person).*number;
+      needed.push_back(first_view(course.follower, [&](const Answer& a) { return a.*number <= wanted; }));
+      std::printf(" %zu", needed.back());
+    }
+    std::printf("; median %.1f, %.0f %%\n", median(needed), 100 * median(needed) / static_cast<double>(kRandom));
+  };
+  tell("stated mm", &Answer::mm);
+  tell("stated deg", &Answer::deg);
+  tell("scatter mm", &Answer::scatter_mm);
+  tell("scatter deg", &Answer::scatter_deg);
   // Stated and true, over all seeds.
   const auto row = [](const char* who, std::size_t views, const std::vector<Answer>& answers) {
     std::vector<Eigen::Vector3d> away_mm, away_deg;
-    double stated_mm = 0, stated_deg = 0;
+    const auto mean = [&](double Answer::*number) {
+      double squares = 0;
+      for (const Answer& answer : answers) squares += answer.*number * (answer.*number);
+      return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, answers.size())));
+    };
     for (const Answer& answer : answers) {
       away_mm.push_back(answer.away_mm);
       away_deg.push_back(answer.away_deg);
-      stated_mm += answer.mm * answer.mm / static_cast<double>(answers.size());
-      stated_deg += answer.deg * answer.deg / static_cast<double>(answers.size());
     }
-    std::printf("  %-9s %2zu views: stated %.3f mm %.4f deg, true %.3f mm %.4f deg (%zu)\n", who, views,
-                std::sqrt(stated_mm), std::sqrt(stated_deg), rms(away_mm), rms(away_deg), answers.size());
+    std::printf(
+        "  %-9s %2zu views: stated %.3f mm %.4f deg, scatter %.3f mm %.4f deg, true %.3f mm %.4f deg (%zu)\n",
+        who, views, mean(&Answer::mm), mean(&Answer::deg), mean(&Answer::scatter_mm),
+        mean(&Answer::scatter_deg), rms(away_mm), rms(away_deg), answers.size());
   };
   std::vector<Answer> persons;
   for (const Course& course : courses)
     if (course.person) persons.push_back(*course.person);
   row("random", kRandom, persons);
-  for (const std::size_t views : {6U, 8U, 10U, 12U, 16U, 20U}) {
+  for (const std::size_t views : {6U, 8U, 10U, 11U, 12U, 13U, 14U}) {
     std::vector<Answer> answers;
     for (const Course& course : courses)
       for (const Answer& answer : course.follower)
