@@ -26,7 +26,7 @@ PICTURES = {
         "cell_size.png": ("demo/cell/size.html", 1180, 560, ""),
         "cell_slip.png": ("demo/cell/slip.html", 1180, 500, ONLY("pictures-section")),
         "cell_knock.png": ("demo/cell/knock.html", 1180, 560, ""),
-        "watch.png": ("flash-calib watch demo/cell/growing", 1180, 1060, ""),
+        "watch.png": ("flash-calib watch demo/cell/growing", 1180, 1210, ""),
     },
     "identify_a_towel.md": {
         "towel_segment.png": ("demo/segmented/segment.svg", 1856, 723, ""),

@@ -94,7 +94,7 @@ struct Answer {
   std::size_t views = 0;
   double mm = 0, deg = 0;                  ///< stated, rms of three axes
   double scatter_mm = 0, scatter_deg = 0;  ///< of these, what another recording in such poses differs by
-  Eigen::Vector3d away_mm, away_deg;  ///< from the truth
+  Eigen::Vector3d away_mm, away_deg;       ///< from the truth
 };
 
 std::optional<Calibration> solve(const HandEyeScene& scene, const std::vector<Observation>& views) {
@@ -204,7 +204,8 @@ void study(Setup setup, double deg, double mm, std::size_t seeds, unsigned first
       needed.push_back(first_view(course.follower, [&](const Answer& a) { return a.*number <= wanted; }));
       std::printf(" %zu", needed.back());
     }
-    std::printf("; median %.1f, %.0f %%\n", median(needed), 100 * median(needed) / static_cast<double>(kRandom));
+    std::printf("; median %.1f, %.0f %%\n", median(needed),
+                100 * median(needed) / static_cast<double>(kRandom));
   };
   tell("stated mm", &Answer::mm);
   tell("stated deg", &Answer::deg);

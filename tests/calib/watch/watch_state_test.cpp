@@ -11,9 +11,9 @@ namespace {
 
 struct Recording {
   HandEyeScene scene;
-  Target target{.kind = TargetKind::chessboard, .columns = 9, .rows = 6, .spacing = 0.025};
-  Dataset posed;
-  std::vector<Detection> detections;
+  Target target = parse_target("chessboard:9x6:0.025");
+  Dataset posed = {};
+  std::vector<Detection> detections = {};
 };
 
 Recording make_recording(const SceneSettings& settings, unsigned seed) {
@@ -102,7 +102,7 @@ TEST(WatchState, EveryCornerIsCountedInTheCellThatItLiesIn) {
 }
 
 TEST(WatchState, TheNextPictureShowsTheTargetWhereItsOutlineIs) {
-  for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand}) {
+  for (const calib::Setup setup : {calib::Setup::eye_in_hand, calib::Setup::eye_to_hand}) {
     SceneSettings settings = few_views(8);
     settings.setup = setup;
     const Recording recording = make_recording(settings, 4);
@@ -114,7 +114,7 @@ TEST(WatchState, TheNextPictureShowsTheTargetWhereItsOutlineIs) {
     ASSERT_TRUE(state.next);
     const HandEyeScene& scene = recording.scene;
     const Eigen::Isometry3d& G = state.next->T_base_gripper;
-    const Eigen::Isometry3d T_camera_target = setup == Setup::eye_in_hand
+    const Eigen::Isometry3d T_camera_target = setup == calib::Setup::eye_in_hand
                                                   ? scene.truth.X.inverse() * G.inverse() * scene.truth.Z
                                                   : scene.truth.X.inverse() * G * scene.truth.Z;
     const Eigen::Vector3d far(0.2, 0.125, 0);
@@ -127,7 +127,7 @@ TEST(WatchState, TheNextPictureShowsTheTargetWhereItsOutlineIs) {
               5);
     EXPECT_LT(state.next->translation_sd, known_after(*inputs.answer).translation_sd);
     const nlohmann::ordered_json json = to_json(state);
-    EXPECT_EQ(json["answer"]["transform"]["parent"], setup == Setup::eye_in_hand ? "gripper" : "base");
+    EXPECT_EQ(json["answer"]["transform"]["parent"], setup == calib::Setup::eye_in_hand ? "gripper" : "base");
     EXPECT_EQ(json["next"]["outline_px"].size(), 8U);
   }
 }
