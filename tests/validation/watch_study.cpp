@@ -93,8 +93,9 @@ Cell make_cell(const SceneSettings& settings, const Eigen::Matrix3Xd& points, un
 struct Answer {
   std::size_t views = 0;
   double mm = 0, deg = 0;                  ///< stated, rms of three axes
+  double place_mm = 0;                     ///< of a place as far away as the target
   double scatter_mm = 0, scatter_deg = 0;  ///< of these, what another recording in such poses differs by
-  Eigen::Vector3d away_mm, away_deg;       ///< from the truth
+  Eigen::Vector3d away_mm, away_deg, away_place_mm;  ///< from the truth
 };
 
 std::optional<Calibration> solve(const HandEyeScene& scene, const std::vector<Observation>& views) {
@@ -111,13 +112,18 @@ Answer answer_of(const HandEyeScene& scene, const Calibration& result, std::size
   const auto deg = [](const Matrix6d& c) {
     return std::sqrt(c.bottomRightCorner<3, 3>().trace() / 3) / kDegree;
   };
+  const Eigen::Vector3d place(0, 0, scene.settings.distance);
+  Eigen::Matrix<double, 3, 6> at_place;
+  at_place << Eigen::Matrix3d::Identity(), -skew(place);
   return {views,
           mm(result.covariance),
           deg(result.covariance),
+          1e3 * std::sqrt((at_place * result.covariance * at_place.transpose()).trace() / 3),
           mm(result.repeatable),
           deg(result.repeatable),
           1e3 * away.head<3>(),
-          away.tail<3>() / kDegree};
+          away.tail<3>() / kDegree,
+          1e3 * (at_place * away)};
 }
 
 /// Of one cell: the person after 20 views, and the follower after each.
@@ -127,7 +133,7 @@ struct Course {
   int wasted = 0;  ///< views of the follower that did not show the whole target
 };
 
-Course run(const Cell& cell, unsigned seed) {
+Course run(const Cell& cell, bool determinant, unsigned seed) {
   const HandEyeScene& scene = cell.scene;
   std::mt19937 random(seed + 31);
   std::normal_distribution<double> normal;
@@ -143,7 +149,7 @@ Course run(const Cell& cell, unsigned seed) {
     if (result) {
       PlanSettings settings = cell.plan;
       settings.seed = static_cast<unsigned>(taken);
-      if (std::getenv("DET")) settings.criterion = PlanCriterion::determinant;
+      if (determinant) settings.criterion = PlanCriterion::determinant;
       const Plan plan = plan_poses(*result, scene.points, settings);
       // People come near to a pose: 5 mm and 1 degree an axis.
       Vector6d off;
@@ -180,7 +186,7 @@ double median(std::vector<std::size_t> values) {
                                 : 0.5 * static_cast<double>(values[half - 1] + values[half]);
 }
 
-void study(Setup setup, double deg, double mm, std::size_t seeds, unsigned first_seed) {
+void study(Setup setup, bool determinant, double deg, double mm, std::size_t seeds, unsigned first_seed) {
   SceneSettings settings;
   settings.setup = setup;
   settings.robot_deg = deg;
@@ -189,12 +195,12 @@ void study(Setup setup, double deg, double mm, std::size_t seeds, unsigned first
   std::vector<Course> courses(seeds);
   data::for_each_in_parallel(seeds, 0, [&](std::size_t i) {
     const unsigned seed = first_seed + static_cast<unsigned>(i);
-    courses[i] = run(make_cell(settings, points, seed), seed);
+    courses[i] = run(make_cell(settings, points, seed), determinant, seed);
   });
   int wasted = 0;
   for (const Course& course : courses) wasted += course.wasted;
-  std::printf("%s, robot %.2f deg %.1f mm, %zu seeds, %d views wasted\n", to_string(setup), deg, mm, seeds,
-              wasted);
+  std::printf("%s, %s, robot %.2f deg %.1f mm, %zu seeds, %d views wasted\n", to_string(setup),
+              determinant ? "determinant" : "trace", deg, mm, seeds, wasted);
   const auto tell = [&](const char* what, double Answer::*number) {
     std::vector<std::size_t> needed;
     std::printf("  views until known as by %zu random ones, %s:", kRandom, what);
@@ -209,11 +215,12 @@ void study(Setup setup, double deg, double mm, std::size_t seeds, unsigned first
   };
   tell("stated mm", &Answer::mm);
   tell("stated deg", &Answer::deg);
+  tell("stated mm at the target", &Answer::place_mm);
   tell("scatter mm", &Answer::scatter_mm);
   tell("scatter deg", &Answer::scatter_deg);
   // Stated and true, over all seeds.
   const auto row = [](const char* who, std::size_t views, const std::vector<Answer>& answers) {
-    std::vector<Eigen::Vector3d> away_mm, away_deg;
+    std::vector<Eigen::Vector3d> away_mm, away_deg, away_place_mm;
     const auto mean = [&](double Answer::*number) {
       double squares = 0;
       for (const Answer& answer : answers) squares += answer.*number * (answer.*number);
@@ -222,11 +229,14 @@ void study(Setup setup, double deg, double mm, std::size_t seeds, unsigned first
     for (const Answer& answer : answers) {
       away_mm.push_back(answer.away_mm);
       away_deg.push_back(answer.away_deg);
+      away_place_mm.push_back(answer.away_place_mm);
     }
     std::printf(
-        "  %-9s %2zu views: stated %.3f mm %.4f deg, scatter %.3f mm %.4f deg, true %.3f mm %.4f deg (%zu)\n",
-        who, views, mean(&Answer::mm), mean(&Answer::deg), mean(&Answer::scatter_mm),
-        mean(&Answer::scatter_deg), rms(away_mm), rms(away_deg), answers.size());
+        "  %-9s %2zu views: stated %.3f mm %.4f deg, at the target %.3f mm; scatter %.3f mm %.4f deg; true "
+        "%.3f "
+        "mm %.4f deg, at the target %.3f mm (%zu)\n",
+        who, views, mean(&Answer::mm), mean(&Answer::deg), mean(&Answer::place_mm), mean(&Answer::scatter_mm),
+        mean(&Answer::scatter_deg), rms(away_mm), rms(away_deg), rms(away_place_mm), answers.size());
   };
   std::vector<Answer> persons;
   for (const Course& course : courses)
@@ -249,7 +259,7 @@ int main(int argc, char** argv) {
   const std::size_t seeds = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 10;
   const unsigned first_seed = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 1700001;
   using flash::calib::Setup;
-  const auto only = argc > 3 ? std::atoi(argv[3]) : -1;
-  if (only != 1) flash::calib::study(Setup::eye_in_hand, 0.05, 0.5, seeds, first_seed);
-  if (only != 0) flash::calib::study(Setup::eye_to_hand, 0.05, 0.5, seeds, first_seed);
+  for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand})
+    for (const bool determinant : {false, true})
+      flash::calib::study(setup, determinant, 0.05, 0.5, seeds, first_seed);
 }
