@@ -222,7 +222,7 @@ Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
   const Matrix6d start = camera_covariance(information);
   plan.translation_sd = sd(start, false);
   plan.rotation_sd = sd(start, true);
-  for (int i = 0; i < settings.poses; ++i) {
+  for (int i = 0; i < settings.poses && !candidates.empty(); ++i) {
     const Candidate* best = nullptr;
     Matrix6d best_covariance;
     double least = std::numeric_limits<double>::infinity();
@@ -236,6 +236,7 @@ Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
     }
     information += best->information;
     plan.poses.push_back({best->T_base_gripper, sd(best_covariance, false), sd(best_covariance, true)});
+    candidates.erase(candidates.begin() + (best - candidates.data()));  // a pose twice shows its errors once
   }
   return plan;
 }
