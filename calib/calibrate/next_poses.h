@@ -19,8 +19,8 @@ struct PlanSettings {
   Eigen::Vector3d upper = Eigen::Vector3d::Constant(1e9);
   double reach =
       0.10;  ///< how far beyond the box of the poses already used candidates go, where bounds allow [m]
-  double tilt = 0.8;      ///< of the gripper from the mean orientation, at most [rad]
-  double turn = 1.6;      ///< about its axis from the mean orientation, at most [rad]
+  double tilt = 0.8;  ///< of the gripper from the mean orientation, at most [rad]
+  double turn = 1.6;  ///< about its axis from the mean orientation, at most [rad]
   /// Of an arm that cannot tilt: turns about its axis alone, the place along it aside.
   bool one_axis = false;
   double margin = 0.05;   ///< of the target's points from the edge of the picture, as a share of its width
