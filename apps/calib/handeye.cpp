@@ -62,13 +62,14 @@ std::optional<calib::MeasuredHeight> measured_height(const HandEyeOptions& optio
   calib::MeasuredHeight measured{.target = options.camera_height.empty()};
   const std::string& text = measured.target ? options.target_height : options.camera_height;
   const std::size_t colon = text.find(':');
+  constexpr double kFarthest = 10;  // no arm reaches that far [m]
   const auto number = [](const std::string& part, double& value) {
-    return CLI::detail::lexical_cast(part, value) && std::abs(value) < 100;
+    return CLI::detail::lexical_cast(part, value) && std::abs(value) < kFarthest;
   };
   if (!number(text.substr(0, colon), measured.height) ||
       (colon != std::string::npos && !(number(text.substr(colon + 1), measured.sd) && measured.sd > 0)))
     throw data::InputError(std::string(measured.target ? "--target-height" : "--camera-height") + ": found " +
-                           text + ", expected metres, and their standard deviation, as 0.35:0.002");
+                           text + ", expected metres, below 10, and their standard deviation, as 0.35:0.002");
   return measured;
 }
 

@@ -22,6 +22,7 @@
 #include "data/files/error.h"
 #include "data/files/folder_lock.h"
 #include "data/files/json_reader.h"
+#include "data/files/text.h"
 #include "data/files/writable.h"
 
 namespace flash {
@@ -46,6 +47,28 @@ struct ValidatedView {
   const calib::Frame* frame;
   calib::Observation observation;
 };
+
+/// The dataset with the robot where it was when the pictures were taken, as late as the calibration found.
+calib::Dataset at_its_time(calib::Dataset dataset, const calib::Extrinsics& extrinsics,
+                           const CalibCommonOptions& options) {
+  const std::optional<calib::TimeOffset>& offset = extrinsics.inputs.time_offset;
+  if (!offset || !dataset.stream) return dataset;
+  std::vector<calib::Frame> frames;
+  for (calib::Frame& frame : dataset.frames) {
+    const std::optional<calib::Motion> motion =
+        calib::motion_at(*dataset.stream, frame.stamp + offset->estimate);
+    if (!motion) continue;
+    frame.T_base_gripper = motion->pose;
+    frames.push_back(std::move(frame));
+  }
+  if (frames.empty())
+    throw data::InputError(dataset.source + ": no picture has poses about its time, " +
+                           data::format_short(1e3 * offset->estimate) + " ms after its stamp");
+  say(options, "pictures are taken to be " + data::format_short(1e3 * offset->estimate) +
+                   " ms later than their stamps say, as the calibration found");
+  dataset.frames = std::move(frames);
+  return dataset;
+}
 
 std::vector<ValidatedView> views_of(const calib::Dataset& dataset, const calib::Target& target,
                                     const ValidateOptions& options) {
@@ -289,7 +312,7 @@ int run_validate(const CLI::App& verb, ValidateOptions options) {
   if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
-  const calib::Dataset dataset = load_dataset(options.dataset);
+  const calib::Dataset dataset = at_its_time(load_dataset(options.dataset), extrinsics, options.common);
   expect_no_picture_options(verb, dataset);
   std::vector<std::string> read = files_read(options.dataset, dataset, options.common);
   read.push_back(options.extrinsics);

@@ -61,6 +61,10 @@ int run_watch(WatchOptions options) {
   expect_no_camera(options.lens, options.dataset.camera);
   if (!options.lens.own.empty()) options.dataset.camera = options.lens.own;
   expect_one_camera(options.dataset.path);
+  for (const auto& [name, path] :
+       {std::pair{"--camera", &options.dataset.camera}, {"--robot", &options.dataset.robot}})
+    if (!path->empty() && !std::filesystem::exists(*path))
+      throw data::InputError(std::string(name) + ": found " + *path + ", expected a file that is there");
   const calib::WatchSettings settings = settings_of(options);
   WatchServer server(calib::watch_page(settings.folder), options.port);
   const std::atomic<bool>& stop = end_on_signals();

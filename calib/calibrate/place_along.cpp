@@ -19,6 +19,7 @@ SettledPlace settle_along(const OneAxis& axis, const AlongPrior& loose, const Ha
   PlaceAlong& place = settled.place;
   if (measured) {
     place.measured = measured;
+    place.told = measured->sd < PlausibilitySettings{}.deviation * distance;
     place.sd = measured->sd;
     settled.hold = {.target = measured->target,
                     .axis = measured->target ? axis.target : axis.camera,
@@ -51,13 +52,12 @@ Matrix6d covariance_along(const PlaceAlong& place, const Eigen::Isometry3d& X) {
 }
 
 std::string untold_sentence(const PlaceAlong& place, Setup setup) {
+  const bool in_hand = setup == Setup::eye_in_hand;
   return "the camera's place along " + text_of(place.axis.camera) + " of the " +
-         (setup == Setup::eye_in_hand ? "gripper" : "base") +
-         " is not told, as the robot turns about that axis alone: all else is; measure where the camera or "
-         "the "
-         "target is along it, and add --camera-height or --target-height, or add views that tilt about "
-         "another "
-         "axis";
+         (in_hand ? "gripper" : "base") + ", and with it the target's along " + text_of(place.axis.target) +
+         " of the " + (in_hand ? "base" : "gripper") +
+         ", is not told, as the robot turns about that axis alone: all else is; measure one of them, and add "
+         "--camera-height or --target-height, or add views that tilt about another axis";
 }
 
 }  // namespace flash::calib

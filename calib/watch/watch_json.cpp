@@ -66,13 +66,16 @@ Json to_json(const WatchAnswer& answer, const WatchState& state) {
   Json json = {{"views", answer.views}, {"not_yet", answer.not_yet}, {"no_plan", answer.no_plan}};
   if (!answer.calibration) return json;
   const Calibration& calibration = *answer.calibration;
-  const Vector6d sd = parent_deviations(calibration.poses.X, calibration.covariance);
+  const ToldDeviations told = told_deviations(calibration, calibration.covariance, Axes::parent);
+  Json sd_mm = Json::array(), sd_deg = Json::array();
+  for (std::size_t k = 0; k < 6; ++k)
+    (k < 3 ? sd_mm : sd_deg).push_back(told[k] ? Json((k < 3 ? 1e3 : kDegrees) * *told[k]) : Json(nullptr));
   const KnownAfter known = known_after(answer);
   json["used"] = calibration.used.size();
   json["usable"] = calibration.usable;
   json["transform"] = calib::to_json(NamedTransform{state.parent, state.child, calibration.poses.X});
-  json["sd_mm"] = list(Eigen::Vector3d(1e3 * sd.head<3>()));
-  json["sd_deg"] = list(Eigen::Vector3d(kDegrees * sd.tail<3>()));
+  json["sd_mm"] = std::move(sd_mm);
+  json["sd_deg"] = std::move(sd_deg);
   json["translation_sd_mm"] = 1e3 * known.translation_sd;
   json["rotation_sd_deg"] = kDegrees * known.rotation_sd;
   json["warnings"] = calibration.warnings;

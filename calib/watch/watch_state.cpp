@@ -181,7 +181,10 @@ NextPose next_pose(const WatchInputs& inputs, const std::vector<Eigen::Isometry3
 KnownAfter known_after(const WatchAnswer& answer) {
   KnownAfter known{.views = answer.views};
   if (!answer.calibration) return known;
-  const Matrix6d& covariance = answer.calibration->covariance;
+  const Calibration& calibration = *answer.calibration;
+  Matrix6d covariance = calibration.covariance;
+  if (calibration.along && !calibration.along->told)
+    covariance -= covariance_along(*calibration.along, calibration.poses.X);
   known.translation_sd = std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3);
   known.rotation_sd = std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3);
   return known;

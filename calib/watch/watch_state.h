@@ -17,7 +17,7 @@ struct WatchedPicture {
   std::optional<Eigen::Isometry3d> T_base_gripper = {};  ///< none: no pose yet
 };
 
-/// How well X was known after so many views: rms of three axes [m, rad].
+/// How well X was known after so many views: rms of three axes, of what is told [m, rad].
 struct KnownAfter {
   std::size_t views = 0;
   double translation_sd = 0, rotation_sd = 0;

@@ -369,8 +369,8 @@ def traps():
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
     yield Trap("a misspelt setup", "in_hand", option("--setup", "eye-in-hnad"), 2, "--setup", "eye-in-hand,eye-to-hand")
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")
-    yield Trap("one axis", "one_axis", nothing, 0, "is not told", "turns about that axis alone")
-    yield Trap("one axis, a noisy robot", "one_axis_noisy", nothing, 0, "is not told")
+    yield Trap("one axis", "one_axis", nothing, 0, "is not told", "turns about that axis alone", used=8)
+    yield Trap("one axis, a noisy robot", "one_axis_noisy", nothing, 0, "is not told", used=12)
     yield Trap("flipped boards", "flipped", nothing, 0, "numbered from its other end", used=16)
 
 
@@ -378,19 +378,20 @@ def draw(tool, work):
     common = ("640x480", "0.02", "0.2")
     program.must(tool, work / "in_hand", "eye-in-hand", BOARD, 16, *common, 1)
     program.must(tool, work / "to_hand", "eye-to-hand", BOARD, 16, *common, 2)
+    program.must(tool, work / "late", "eye-in-hand", BOARD, 12, "640x480", "0.02", "0.2", 7, "motion=stream", "time_offset=0.03")
     program.must(tool, work / "one_axis", "eye-in-hand", BOARD, 8, *common, 3, "motion=one-axis")
     program.must(tool, work / "one_axis_noisy", "eye-in-hand", BOARD, 12, "640x480", "0.3", "0.5", 5, "motion=one-axis")
     program.must(tool, work / "flipped", "eye-in-hand", PLAIN, 16, *common, 4)
 
 
 def far_off(result, truth):
-    """The largest error in its stated standard deviations, over translation and over rotation."""
+    """The largest error in its stated standard deviations, over translation and over rotation, of what is told."""
     t, q = result["transform"]["translation"], result["transform"]["rotation_xyzw"]
     sd = result["predicted_sd"]
-    away = rotate(conjugate(q), [b - a for a, b in zip(t, truth[1:4])])
+    away = [b - a for a, b in zip(t, truth[1:4])]
     turn = [2 * x for x in multiply(conjugate(q), truth[4:])]
     turn = turn[:3] if turn[3] > 0 else [-x for x in turn[:3]]
-    return max([abs(1000 * a) / s for a, s in zip(away, sd["translation_mm"])] +
+    return max([abs(1000 * a) / s for a, s in zip(away, sd["translation_parent_mm"]) if s is not None] +
                [abs(math.degrees(a)) / s for a, s in zip(turn, sd["rotation_deg"])])
 
 
@@ -470,6 +471,10 @@ def wrongly_told(calib, work):
     piped = program.call(calib, "handeye", work / "in_hand", "--force", "-o", work / "camera.json")
     if "\r" in piped.stderr or "solving" in piped.stderr:
         yield f"progress where there is no terminal: {piped.stderr!r}"
+    late = program.call(calib, "handeye", work / "late", "-o", work / "late.json")
+    valid = program.call(calib, "validate", work / "late", "--extrinsics", work / "late.json")
+    if late.returncode or valid.returncode or "as the calibration found" not in valid.stderr:
+        yield f"pictures that are 30 ms late do not agree with what was found from them: {late.stderr} {valid.stderr}"
 
 
 def main():
