@@ -77,7 +77,8 @@ def of_flash(sequence, answer):
     deg, mm = se3.pose_error(X, sequence.X)
     away = motion_between(camera, truth)
     square = float(away @ numpy.linalg.solve(numpy.array(answer["covariance"]), away))
-    return {"deg": float(deg), "mm": float(mm), "square": square}
+    whole = not answer.get("one_axis") or answer["one_axis"]["told"]
+    return {"deg": float(deg), "mm": float(mm), "square": square, "whole": whole}
 
 
 def of_baselines(sequence, data):
@@ -118,20 +119,21 @@ def best_baseline(rows):
 def track_line(track, rows):
     """A line of the table."""
     answered = [row for row in rows if row["code"] == 0]
-    line = f"| {track} | {len(rows)} | {len(answered)} | {len(rows) - len(answered)} |"
-    if not answered:
+    whole = [row for row in answered if row["flash"]["whole"]]
+    line = f"| {track} | {len(rows)} | {len(answered)} | {len(answered) - len(whole)} | {len(rows) - len(answered)} |"
+    if not whole:
         return line + " - | - | - | - |"
     inside = sum(row["flash"]["square"] < CHI_SQUARE_95_OF_6 for row in answered)
-    deg, mm = (float(numpy.median([row["flash"][measure] for row in answered])) for measure in ("deg", "mm"))
-    name, best_deg, best_mm = best_baseline(answered)
+    deg, mm = (float(numpy.median([row["flash"][measure] for row in whole])) for measure in ("deg", "mm"))
+    name, best_deg, best_mm = best_baseline(whole)
     mark = "" if mm <= best_mm else " (behind)"
     return line + f" {inside} of {len(answered)} | {deg:.3f}, {mm:.2f}{mark} | {best_deg:.3f}, {best_mm:.2f} | {name} |"
 
 
 def table(rows):
     """Markdown: tracks, then causes of refusals."""
-    lines = ["| track | sequences | answered | refused | inside 95 % | flash deg, mm | best baseline deg, mm | which |",
-             "|---|---|---|---|---|---|---|---|"]
+    lines = ["| track | sequences | answered | of them in part | refused | inside 95 % | flash deg, mm | best baseline deg, mm | which |",
+             "|---|---|---|---|---|---|---|---|---|"]
     tracks = collections.defaultdict(list)
     for row in rows:
         tracks[row["track"]].append(row)

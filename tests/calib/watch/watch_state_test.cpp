@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/calib/four_axis_scene.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {
@@ -144,11 +145,29 @@ TEST(WatchState, TurnsAboutOneAxisAreNamedAndNothingIsThrown) {
   WatchInputs inputs = inputs_of(recording);
   inputs.answer = answer_of(recording);
   EXPECT_FALSE(inputs.answer->calibration);
-  EXPECT_NE(inputs.answer->not_yet.find("one axis"), std::string::npos) << inputs.answer->not_yet;
+  EXPECT_FALSE(inputs.answer->not_yet.empty());  // the pictures show other turns
   const WatchState state = watch_state(inputs);
   EXPECT_FALSE(state.next);
   EXPECT_NE(state.turns.sentence.find("turn more about"), std::string::npos);
   EXPECT_EQ(state.turns.sentence.find("(0.00, 0.00, 1.00)"), std::string::npos);
+}
+
+// Its place along the axis has no deviation, and does not count in how well the camera is known.
+TEST(WatchState, WhatAnArmOfFourAxesDoesNotTellHasNoDeviation) {
+  const HandEyeScene scene = make_four_axis_scene({}, 1);
+  CalibrateSettings settings;
+  settings.folds = 2;
+  WatchAnswer answer{.views = scene.observations.size(), .not_yet = {}};
+  answer.calibration = calibrate(scene.settings.setup, scene.camera, scene.points,
+                                 grid_symmetries(scene.points), scene.observations, settings);
+  ASSERT_TRUE(answer.calibration->along && !answer.calibration->along->told);
+  EXPECT_LT(known_after(answer).translation_sd, 0.01);
+  WatchState state;
+  state.answer = std::move(answer);
+  const nlohmann::ordered_json json = to_json(state)["answer"];
+  int untold = 0;
+  for (const auto& sd : json["sd_mm"]) untold += sd.is_null();
+  EXPECT_EQ(untold, 1);
 }
 
 }  // namespace
