@@ -313,7 +313,8 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     summary.recordings.push_back(
         summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
     summary.recordings.back().markers = markers_of(answer.fit, r, settings.score.objective.marker_sigma);
-    if (r < answer.clocks.size()) summary.recordings.back().clock = answer.clocks[r];
+    if (r < answer.clocks.size() && answer.clocks[r].sd > 0)  // within a bound
+      summary.recordings.back().clock = answer.clocks[r];
     if (r < answer.residuals.size()) {
       summary.recordings.back().error_cost = answer.residuals[r].error_cost;
       summary.recordings.back().spread = answer.residuals[r].spread;
