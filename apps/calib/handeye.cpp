@@ -27,6 +27,7 @@
 #include "data/files/error.h"
 #include "data/files/folder_lock.h"
 #include "data/files/json_reader.h"
+#include "data/files/text.h"
 #include "data/files/writable.h"
 
 namespace flash {
@@ -64,7 +65,9 @@ std::optional<calib::MeasuredHeight> measured_height(const HandEyeOptions& optio
   const std::size_t colon = text.find(':');
   constexpr double kFarthest = 10;  // no arm reaches that far [m]
   const auto number = [](const std::string& part, double& value) {
-    return CLI::detail::lexical_cast(part, value) && std::abs(value) < kFarthest;
+    const std::optional<double> parsed = data::parse_number(part);
+    value = parsed.value_or(value);
+    return parsed && std::abs(*parsed) < kFarthest;
   };
   if (!number(text.substr(0, colon), measured.height) ||
       (colon != std::string::npos && !(number(text.substr(colon + 1), measured.sd) && measured.sd > 0)))

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/report/json_list.h"
 #include "calib/uncertainty/joint_zeros.h"
 #include "data/camera/posed_lens.h"
 #include "data/motion/trajectory.h"
@@ -13,13 +14,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / M_PI;
-
-template <class Vector>
-Json list(const Vector& v) {
-  Json values = Json::array();
-  for (Eigen::Index i = 0; i < v.size(); ++i) values.push_back(v[i]);
-  return values;
-}
 
 template <class Matrix>
 Json rows(const Matrix& m) {

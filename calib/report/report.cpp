@@ -12,6 +12,7 @@
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/extrinsics_json.h"
 #include "calib/report/jpeg.h"
+#include "calib/report/json_list.h"
 #include "data/motion/trajectory.h"
 #include "data/picture/html_page.h"
 
@@ -25,13 +26,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / M_PI;
-
-template <class Vector>
-Json list(const Vector& v) {
-  Json values = Json::array();
-  for (Eigen::Index i = 0; i < v.size(); ++i) values.push_back(v[i]);
-  return values;
-}
 
 Json pose(const Eigen::Isometry3d& T) { return list(data::to_vector(T)); }
 

@@ -3,6 +3,7 @@
 
 #include "calib/calibrate/extrinsics.h"
 #include "calib/report/extrinsics_json.h"
+#include "calib/report/json_list.h"
 #include "calib/watch/watch_state.h"
 
 namespace flash::calib {
@@ -11,13 +12,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / M_PI;
-
-template <class Vector>
-Json list(const Vector& v) {
-  Json values = Json::array();
-  for (Eigen::Index i = 0; i < v.size(); ++i) values.push_back(v[i]);
-  return values;
-}
 
 /// x y by turns, in hundredths of a pixel.
 Json pixels(const Eigen::Matrix2Xd& places) {

@@ -96,8 +96,9 @@ SearchedMesh searched_mesh(const Summary& summary, const std::string& run, const
   const double here = extent_of("", path, recording);
   std::string sizes;
   for (std::size_t r = 0; r < meshes.size(); ++r) {
-    const double searched = extent_of(as_searched(r).mesh, path, recording);
-    if (std::abs(searched - here) <= kSame * here) return as_searched(r);
+    SearchedMesh found = as_searched(r);
+    const double searched = extent_of(found.mesh, path, recording);
+    if (std::abs(searched - here) <= kSame * here) return found;
     sizes += (sizes.empty() ? "" : ", ") + data::format_short(searched) + " m";
   }
   throw data::input_error(recording.source, "object.mesh",

@@ -18,38 +18,10 @@ import threading
 
 import png
 import program
+from tum_poses import conjugate, inverted, multiply, read_poses, rotate, write_poses
 
 BOARD, PLAIN = "chessboard:9x6:0.025", "chessboard:8x6:0.025"  # 8 x 6 looks the same after half a turn
 SIGMAS = 4.5  # of six components: beyond it one correct answer in 25,000
-
-
-# Poses as the lines of a TUM file: stamp, x y z, qx qy qz qw.
-
-def read_poses(path):
-    return [[float(word) for word in line.split()] for line in path.read_text().splitlines() if line[:1] not in "#"]
-
-
-def write_poses(path, poses):
-    path.write_text("".join(" ".join(f"{value:.12g}" for value in pose) + "\n" for pose in poses))
-
-
-def multiply(a, b):
-    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
-    return [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz]
-
-
-def conjugate(q):
-    return [-q[0], -q[1], -q[2], q[3]]
-
-
-def rotate(q, v):
-    return multiply(multiply(q, [*v, 0]), conjugate(q))[:3]
-
-
-def inverted(pose):
-    q = conjugate(pose[4:])
-    return [pose[0], *(-x for x in rotate(q, pose[1:4])), *q]
 
 
 def jolted(pose, rng):

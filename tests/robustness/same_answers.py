@@ -9,6 +9,7 @@ import struct
 import tempfile
 
 import program
+from tum_poses import multiply, read_poses, rotate, write_poses
 
 SEARCH = ["--no-plan", "--no-horizon", "--quiet", "--force"]
 BENDING, FRICTION = ["--bending", "2e-5:5e-4:5:log"], ["--friction", "0.15:0.6:3:log"]
@@ -17,28 +18,22 @@ SOLVER = 0.05  # of the width: steps solved to 1e-3 of the weight, on other numb
 LATTICE = 0.15  # of the width: motions about the answer are simulated at other values
 
 
-def product(p, q):
-    """Of quaternions x y z w."""
-    (a, b, c, d), (x, y, z, w) = p, q
-    return [d * x + a * w + b * z - c * y, d * y - a * z + b * w + c * x, d * z + a * y - b * x + c * w, d * w - a * x - b * y - c * z]
-
-
 class Move:
     """A rigid motion."""
 
     def __init__(self, axis, angle, shift):
         length = math.sqrt(sum(a * a for a in axis))
         self.turn = [math.sin(angle / 2) * a / length for a in axis] + [math.cos(angle / 2)]
-        self.matrix, self.shift = program.rotation_of(self.turn), shift
+        self.shift = shift
 
     def direction(self, v):
-        return [sum(row[k] * v[k] for k in range(3)) for row in self.matrix]
+        return rotate(self.turn, v)
 
     def point(self, p):
         return [a + b for a, b in zip(self.direction(p), self.shift)]
 
     def pose(self, pose):
-        return self.point(pose[:3]) + product(self.turn, pose[3:])
+        return self.point(pose[:3]) + multiply(self.turn, pose[3:])
 
 
 def moved(recording, move, folder):
@@ -49,13 +44,7 @@ def moved(recording, move, folder):
     record["object"]["start"]["T_base_object"] = move.pose(record["object"]["start"]["T_base_object"])
     record["table"] = {"point": move.point(record["table"]["point"]), "normal": move.direction(record["table"]["normal"])}
     record["camera"]["T_base_camera"] = move.pose(record["camera"]["T_base_camera"])
-    lines = []
-    for line in (recording / "gripper.tum").read_text().splitlines():
-        if line.startswith("#"):
-            continue
-        time, *pose = map(float, line.split())
-        lines.append(" ".join(f"{value!r}" for value in [time, *move.pose(pose)]))
-    (folder / "gripper.tum").write_text("\n".join(lines) + "\n")
+    write_poses(folder / "gripper.tum", [[time, *move.pose(pose)] for time, *pose in read_poses(recording / "gripper.tum")])
     (folder / "camera_info.yaml").write_text((recording / "camera_info.yaml").read_text())
     for frame in record["keyframes"]:
         head, body = (recording / frame["cloud"]).read_bytes().split(b"end_header\n", 1)
