@@ -38,9 +38,8 @@ int run_export(const ExportOptions& options) {
   const data::Asset base = data::load_asset(options.asset.empty() ? summary.asset : options.asset);
   data::check_file_free(options.out, options.common.force);
   for (const sysid::SummaryRecording& recording : summary.recordings)
-    if (!recording.own_mesh)
-      sysid::expect_as_searched({.mesh = recording.mesh, .digest = recording.mesh_sha256},
-                                options.run + "/summary.json", "recordings." + recording.name + ".mesh");
+    sysid::expect_as_searched({.mesh = recording.mesh, .digest = recording.mesh_sha256},
+                              options.run + "/summary.json", "recordings." + recording.name + ".mesh");
   const data::Asset tuned = sysid::tuned_asset(base, summary);
   std::vector<std::string> notices;
   const bool solid = tuned.element_type == data::ElementType::tetrahedron;

@@ -80,7 +80,8 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
          {"score_m", number(recording.score_on_mesh)},
          {"horizon_s", recording.horizon_s ? Json(*recording.horizon_s) : Json(nullptr)}});
     if (!recording.mesh.empty() && !recording.own_mesh) json["recordings"].back()["mesh"] = recording.mesh;
-    if (!recording.mesh_sha256.empty()) json["recordings"].back()["mesh_sha256"] = recording.mesh_sha256;
+    if (!recording.mesh_sha256.empty() && !recording.own_mesh)
+      json["recordings"].back()["mesh_sha256"] = recording.mesh_sha256;
     if (const auto size = recording.nuisance.find("grasp_size"); size != recording.nuisance.end())
       json["recordings"].back()["grasp_size_m"] = size->second;
     if (recording.horizon_s) horizon = std::min(horizon.value_or(*recording.horizon_s), *recording.horizon_s);

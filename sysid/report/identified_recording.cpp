@@ -35,7 +35,7 @@ std::optional<IdentifiedRecording> identified_recording(const data::Asset& asset
     found.mesh.mesh = text_of(recording, "mesh").value_or("");
     found.mesh.digest = text_of(recording, "mesh_sha256").value_or("");
     if (const nlohmann::json solver = of("solver"); solver.is_object())
-      found.mesh.cell_scale = cell_scale_of(text_of(solver, "cell_scale"), "identification.solver");
+      found.mesh.cell_scale = cell_scale_of(text_of(solver, "cell_scale"), asset.source);
     if (recordings.size() == 1) {  // earlier programs kept what all have in common
       if (!found.horizon_s) found.horizon_s = number_of(identification, "horizon_s");
       if (!found.score) found.score = number_of(identification, "score_m");

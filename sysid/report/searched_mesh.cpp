@@ -61,21 +61,22 @@ void expect_as_searched(const SearchedMesh& mesh, const std::string& source, con
   if (!data::is_made_on_the_spot(mesh.mesh) && !std::filesystem::exists(mesh.mesh))
     throw data::input_error(source, field,
                             mesh.mesh +
-                                " is missing, expected the mesh that was searched; give --mesh "
-                                "where it lies elsewhere");
+                                " is missing, expected the mesh that was searched: put it back, or "
+                                "repeat the search with --resume and --mesh where it lies elsewhere");
   data::Recording on;
   data::load_object_mesh(mesh.mesh, source, field, on);
   if (!mesh.digest.empty() && mesh_digest(mesh.mesh) != mesh.digest)
     throw data::input_error(source, field,
-                            mesh.mesh + " has changed since the search; give --mesh for the one that counts");
+                            mesh.mesh + " has changed since the search: put it back, or search again");
 }
 
 double cell_scale_of(const std::optional<std::string>& text, const std::string& source) {
   if (!text) return 1;
+  constexpr double kLeast = 1.0 / 16;  // answers take half; each further half has four times the vertices
   const std::optional<double> scale = data::parse_number(*text);
-  if (!scale || !(*scale > 0 && *scale <= 1))
+  if (!scale || !(*scale >= kLeast && *scale <= 1))
     throw data::input_error(source, "cell_scale",
-                            "found \"" + *text + "\", expected a number above 0, at most 1");
+                            "found \"" + *text + "\", expected a number from 0.0625 to 1");
   return *scale;
 }
 

@@ -29,7 +29,7 @@ std::string mesh_digest(const std::string& mesh);
 void expect_as_searched(const SearchedMesh& mesh, const std::string& source, const std::string& field);
 
 /// What `settings` of a summary or an asset say of the scale; 1 where they do not. `source`: names the file.
-/// Throws data::InputError where that is no number above 0, at most 1.
+/// Throws data::InputError where that is no number from 1/16 to 1.
 double cell_scale_of(const std::optional<std::string>& text, const std::string& source);
 
 /// The mesh on which the search in the folder `run` simulated `recording`, or else the first object as large

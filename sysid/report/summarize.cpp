@@ -63,7 +63,7 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
   recording.sha256 = data::recording_sha256(replay.recording, replay.object_mesh);
   recording.mesh = named_mesh(replay);
   recording.own_mesh = replay.settings.mesh.empty();
-  if (!recording.own_mesh) recording.mesh_sha256 = mesh_digest(recording.mesh);
+  recording.mesh_sha256 = mesh_digest(recording.mesh);
   recording.offset = score.offset;
   recording.yaw = score.yaw;
   recording.time_offset = score.time_offset;
@@ -308,12 +308,15 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   summary.fixed = fixed_of(summary, settings);
   for (const HeldParameter& held : held_parameters(settings, replays, answer.values))
     summary.held[held.name] = held.values;
+  constexpr double kAtBound = 1e-6;  // of it
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const Misfit misfit = r < answer.misfits.size() ? answer.misfits[r] : Misfit{};
     summary.recordings.push_back(
         summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
     summary.recordings.back().markers = markers_of(answer.fit, r, settings.score.objective.marker_sigma);
-    if (r < answer.clocks.size() && answer.clocks[r].sd > 0)  // within a bound
+    // At its bound it is not told, and one that recordings share is not that of each.
+    if (r < answer.clocks.size() && !settings.score.shared.time &&
+        std::abs(answer.clocks[r].estimate) < (1 - kAtBound) * replays[r].recording.nuisance.time)
       summary.recordings.back().clock = answer.clocks[r];
     if (r < answer.residuals.size()) {
       summary.recordings.back().error_cost = answer.residuals[r].error_cost;

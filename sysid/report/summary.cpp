@@ -188,7 +188,7 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   if (json.has("clock") && !json.raw("clock").is_null()) {
     const data::JsonObject clock = json.object("clock");
     clock.expect_fields({"estimate_s", "sd_s"});
-    recording.clock = {clock.number("estimate_s"), clock.number("sd_s")};
+    recording.clock = {clock.number("estimate_s"), clock.positive("sd_s")};
   }
   recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
   recording.score = score_of(json, "score");

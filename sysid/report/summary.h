@@ -34,7 +34,7 @@ struct SummaryRecording {
   std::string sha256;     ///< of recording.json and the files it names
   std::string mesh;       ///< specification or file that was searched; empty: an earlier program did not say
   bool own_mesh = false;  ///< it is the recording's own
-  std::string mesh_sha256 = {};  ///< mesh_digest of it where it is a file, and not the recording's own
+  std::string mesh_sha256 = {};                      ///< mesh_digest of it
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< observed = simulated moved by this [m]
   double yaw = 0;                                    ///< [rad]
   double time_offset = 0;                            ///< [s]

@@ -53,11 +53,13 @@ TEST(IdentifiedRecording, ScaleOfCellsMayBeANumber) {
   identification["solver"]["cell_scale"] = 0.25;
   asset.identification = identification.dump();
   EXPECT_EQ(identified_recording(asset, std::string(64, 'a'))->mesh.cell_scale, 0.25);
-  identification["solver"]["cell_scale"] = true;
-  asset.identification = identification.dump();
-  EXPECT_NE(
-      data::input_error_of([&] { identified_recording(asset, std::string(64, 'a')); }).find("cell_scale"),
-      std::string::npos);
+  for (const nlohmann::json& wrong : {nlohmann::json(true), nlohmann::json(1e-9)}) {
+    identification["solver"]["cell_scale"] = wrong;
+    asset.identification = identification.dump();
+    EXPECT_NE(
+        data::input_error_of([&] { identified_recording(asset, std::string(64, 'a')); }).find("cell_scale"),
+        std::string::npos);
+  }
 }
 
 TEST(IdentifiedRecording, AnotherScoreHasAReason) {
