@@ -22,7 +22,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study watch-study
+.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study watch-study held-out
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
 .PHONY: cell pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
@@ -109,6 +109,12 @@ plan-promise: configure-test  ## Say whether following the first proposal of pla
 answer-time: configure-test  ## Say how long it takes from kept motions to the answer: at most 10 s on two idle cores
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/answer_time.py --sysid $(sysid) --out $(BUILD)/answer_time
+
+held-out: configure-test  ## Say whether hand-eye answers predict views left out better than four other methods, on what $(DATA) has and on 40 drawn cells
+	cmake --build $(BUILD) -j $(JOBS) --target flash-calib drawn_cells
+	$(PYTHON) tests/validation/handeye_methods.py --program $(BUILD)/bin/flash-calib $(DATA)/handeye
+	$(BUILD)/tests/drawn_cells $(BUILD)/held_out 40 8100001 1
+	$(PYTHON) tests/validation/handeye_methods.py --drawn $(BUILD)/held_out
 
 size-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly, over 200 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target size_study

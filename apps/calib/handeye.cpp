@@ -42,6 +42,7 @@ struct HandEyeOptions {
   LensOption lens;
   std::optional<double> target_size_sd = {};
   bool size_as_stated = false;
+  unsigned held_out_seed = 0;
   std::string camera_height, target_height;  ///< "0.35" or "0.35:0.002" [m]
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2, camera_info;
@@ -288,6 +289,7 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   settings.size_as_stated = options.size_as_stated;
   settings.height = measured_height(options);
   settings.threads = options.common.threads;
+  settings.held_out_seed = options.held_out_seed;
   settings.clock_offset = options.clock_offset;
   const calib::ImageCalibration solved = solve(options, setup, dataset, settings, phases);
 
@@ -361,6 +363,10 @@ void add_handeye_verb(CLI::App& app, Action& action) {
       "--target-height", options->target_height,
       "In its place, where the target's origin is along that axis, in the base (eye-in-hand) or the "
       "gripper");
+  verb->add_option("--held-out-seed", options->held_out_seed,
+                   "Draws by it the ten parts of the views that are left out in turn; 0: interleaved")
+      ->check(CLI::Range(0, 1'000'000'000))
+      ->capture_default_str();
   verb->add_flag_function(
       "--time-offset,!--no-time-offset",
       [options](std::int64_t asked) {

@@ -37,6 +37,7 @@ struct CalibrateSettings {
   double hopeless = 0.2;  ///< closing error of the majority beyond which nothing is solved, as `suspicious`
   double surprise = 35;   ///< squared size of a correction over that of most views, 6 degrees of freedom
   int folds = 10;         ///< of the held-out residuals
+  unsigned held_out_seed = 0;  ///< by which their views are drawn; 0: interleaved
   std::vector<ClosedForm> closed_forms = calib::closed_forms();  ///< of the comparison table
   /// Of the target's size over the stated one, before a picture is taken; 0: as stated; infinity: not known;
   /// none: usual_size_sd.

@@ -21,18 +21,20 @@ std::vector<PoseLoop> thinned(const std::vector<PoseLoop>& loops) {
 }
 
 template <class Fit>
-HeldOut hold_out_pairs(const std::vector<PoseLoop>& loops, int folds, const Fit& fit) {
-  const int count = static_cast<int>(loops.size()), parts = std::min(folds, count);
+HeldOut hold_out_pairs(const std::vector<PoseLoop>& loops, const CalibrateSettings& settings,
+                       const Fit& fit) {
+  const int count = static_cast<int>(loops.size()), parts = std::min(settings.folds, count);
   HeldOut held;
+  held.fold = parts_of(count, settings.folds, settings.held_out_seed);
   for (int part = 0; part < parts; ++part) {
     std::vector<PoseLoop> train, test;
     for (int i = 0; i < count; ++i)
-      (i % parts == part ? test : train).push_back(loops[static_cast<std::size_t>(i)]);
+      (held.fold[static_cast<std::size_t>(i)] == part ? test : train)
+          .push_back(loops[static_cast<std::size_t>(i)]);
     const ClosingError error = closing_rms(test, fit(train));
     held.mm += std::pow(1e3 * error.translation, 2) * static_cast<double>(test.size()) / count;
     held.deg += std::pow(error.rotation * 180 / M_PI, 2) * static_cast<double>(test.size()) / count;
   }
-  for (int i = 0; i < count; ++i) held.fold.push_back(i % parts);
   held.mm = std::sqrt(held.mm);
   held.deg = std::sqrt(held.deg);
   return held;
@@ -235,10 +237,10 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   const std::vector<PoseLoop> compared = thinned(loops);
   result.comparison = compare_closed_forms(compared, settings.closed_forms);
   for (ComparedMethod& method : result.comparison) {
-    if (method.name == "park") method.held_out = hold_out_pairs(compared, settings.folds, park);
-    if (method.name == "shah") method.held_out = hold_out_pairs(compared, settings.folds, shah);
+    if (method.name == "park") method.held_out = hold_out_pairs(compared, settings, park);
+    if (method.name == "shah") method.held_out = hold_out_pairs(compared, settings, shah);
   }
-  result.held_out = hold_out_pairs(loops, settings.folds, [&](const std::vector<PoseLoop>& train) {
+  result.held_out = hold_out_pairs(loops, settings, [&](const std::vector<PoseLoop>& train) {
     return fit_pose_space(train, better_of(train, shah(train), fit.poses), {}, along).poses;
   });
   result.use = use_error(Use::workspace, result.held_out, std::nullopt);

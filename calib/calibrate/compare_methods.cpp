@@ -54,7 +54,8 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
   const auto hold = [&](Method method, ComparedMethod& entry) {
     const bool corrected = method == Method::errors_in_variables || method == Method::pixels;
     const Bundle& start = corrected ? refined : plain;
-    entry.held_out = hold_out(start, poses, method, settings, calibrate.folds, calibrate.threads);
+    entry.held_out =
+        hold_out(start, poses, method, settings, calibrate.folds, calibrate.threads, calibrate.held_out_seed);
     if (calibrate.use == Use::two_arms && loops.size() >= 4 * static_cast<std::size_t>(calibrate.least_views))
       entry.halves =
           halves_apart(start, poses, method, of_halves, middle, calibrate.folds, calibrate.threads);

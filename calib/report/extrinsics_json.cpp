@@ -187,7 +187,8 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                        {"centre_rms_px", px(calibration.centre_rms)},
                        {"heldout_px", px(calibration.held_out.px)},
                        {"heldout_mm", calibration.held_out.mm},
-                       {"heldout_deg", calibration.held_out.deg}};
+                       {"heldout_deg", calibration.held_out.deg},
+                       {"heldout_part", calibration.held_out.fold}};
   json["lens"] = nullptr;
   if (extrinsics.pixels) {
     const data::CameraIntrinsics &lens = *extrinsics.lens, &stated = *extrinsics.stated_lens;

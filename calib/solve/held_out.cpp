@@ -43,6 +43,12 @@ void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, 
   bundle.targets.front() = poses.Z;
 }
 
+/// The same on every machine, unlike the standard library's.
+template <class Random>
+void shuffle(std::vector<int>& order, Random&& random) {
+  for (std::size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
+}
+
 }  // namespace
 
 const char* to_string(Method method) {
@@ -101,12 +107,22 @@ HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometr
 
 }  // namespace
 
+std::vector<int> parts_of(int count, int folds, unsigned seed) {
+  std::vector<int> order(static_cast<std::size_t>(count));
+  std::iota(order.begin(), order.end(), 0);
+  if (seed > 0) shuffle(order, std::mt19937(seed));
+  std::vector<int> part(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    part[static_cast<std::size_t>(order[i])] = static_cast<int>(i) % std::min(folds, count);
+  return part;
+}
+
 HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-                 const RefineSettings& settings, int folds, int threads) {
+                 const RefineSettings& settings, int folds, int threads, unsigned seed) {
   const int count = static_cast<int>(bundle.poses.size());
   const int parts = std::min(folds, count);
   HeldOut result;
-  for (int i = 0; i < count; ++i) result.fold.push_back(i % parts);
+  result.fold = parts_of(count, folds, seed);
   std::vector<HeldOutSums> sums(static_cast<std::size_t>(parts));
   data::for_each_in_parallel(sums.size(), threads, [&](std::size_t part) {
     sums[part] =
@@ -144,7 +160,7 @@ Halves halves_apart(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& 
   for (int split = 0; split < splits; ++split) {
     std::vector<int> order(count);
     std::iota(order.begin(), order.end(), 0);
-    for (std::size_t i = count - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
+    shuffle(order, random);
     order.resize(count / 2);
     std::sort(order.begin(), order.end());
     half_of.emplace_back(count, 1);

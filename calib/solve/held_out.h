@@ -16,6 +16,10 @@ struct HeldOut {
   std::vector<Eigen::Vector3d> squares;
 };
 
+/// Of each of `count` views the part in which it is left out: interleaved, or drawn at random by a seed above
+/// 0.
+std::vector<int> parts_of(int count, int folds, unsigned seed);
+
 /// Mean of the squares over the poses of each fold. measure: 0 px, 1 mm, 2 deg.
 std::vector<double> means_of_folds(const HeldOut& held, int measure);
 
@@ -34,12 +38,12 @@ enum class Method {
 };
 const char* to_string(Method method);
 
-/// Every view left out once, in `folds` interleaved parts (a pose each when there are no more than that).
+/// Every view left out once, in `folds` parts (a pose each when there are no more than that): parts_of().
 /// Nothing of it stays in the solution: errors in variables estimates the noise levels anew, from those of
 /// `settings`; only the pivots are kept. Parts are solved on as many threads (0: one a processor), to the
 /// same digits.
 HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-                 const RefineSettings& settings, int folds = 10, int threads = 1);
+                 const RefineSettings& settings, int folds = 10, int threads = 1, unsigned seed = 0);
 
 /// Two halves of the views taken for two arms on one camera, again and again.
 struct Halves {

@@ -133,14 +133,15 @@ def squares(views, i, X, Z):
     return numpy.array([px, 1e6 * apart @ apart, numpy.degrees(numpy.linalg.norm(logarithm(T[:3, :3].T @ seen[:3, :3]))) ** 2])
 
 
-def held_out(views, X, folds=10):
-    """Means over the views of each fold, folds x 3; and over all views, weighted as flash-calib does."""
-    count = len(views.robot)
-    parts, each, corners = min(folds, count), [], []
-    for part in range(parts):
-        own = solve(views, [i for i in range(count) if i % parts != part], X)
-        each.append([squares(views, i, *own) for i in range(part, count, parts)])
-        corners += [views.points[i].shape[1] for i in range(part, count, parts)]
+def held_out(views, X, part_of):
+    """Each part of the views predicted by the others. Means over the views of each part, parts x 3; and over all views, weighted
+    as flash-calib does."""
+    views_of = [[i for i, own in enumerate(part_of) if own == part] for part in range(max(part_of) + 1)]
+    each, corners = [], []
+    for left_out in views_of:
+        own = solve(views, [i for i in range(len(part_of)) if i not in left_out], X)
+        each.append([squares(views, i, *own) for i in left_out])
+        corners += [views.points[i].shape[1] for i in left_out]
     every = numpy.concatenate(each)
     rms = numpy.sqrt([numpy.average(every[:, 0], weights=corners), every[:, 1].mean(), every[:, 2].mean()])
     return numpy.array([numpy.mean(fold, axis=0) for fold in each]), rms

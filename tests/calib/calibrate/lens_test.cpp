@@ -100,9 +100,10 @@ TEST_P(Lens, HowFarOffTheStatedLensWouldPutTheCameraIsWhatARefitSays) {
   const Calibration kept = calibrated(scene, stated, settings);
   const Vector6d refit = motion_between(found.poses.X, kept.poses.X);
   EXPECT_GT(refit.head<3>().norm(), 5e-4);
-  // The other answer starts at a seed of its own; both end where steps no longer count.
-  EXPECT_LT((found.lens.camera_shift - refit).head<3>().norm(), 0.02 * refit.head<3>().norm());
-  EXPECT_LT((found.lens.camera_shift - refit).tail<3>().norm(), 0.02 * refit.tail<3>().norm());
+  // The other answer starts at a seed of its own, and weighs the size of the target by what it finds of the
+  // arm itself.
+  EXPECT_LT((found.lens.camera_shift - refit).head<3>().norm(), 0.03 * refit.head<3>().norm());
+  EXPECT_LT((found.lens.camera_shift - refit).tail<3>().norm(), 0.03 * refit.tail<3>().norm());
   EXPECT_EQ(kept.lens.camera_shift.norm(), 0);
 }
 

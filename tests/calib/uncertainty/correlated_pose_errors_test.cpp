@@ -35,7 +35,9 @@ double squared_distance(const HandEyeScene& scene, const Refinement& solution,
   return error.dot(covariance.topLeftCorner<6, 6>().ldlt().solve(error));
 }
 
-TEST(CorrelatedPoseErrors, NoiseAloneRarelyShowsThemAndThenAddsLittle) {
+constexpr double kOdds = 9;  // before any view is seen
+
+TEST(CorrelatedPoseErrors, NoiseAloneRarelyShowsThem) {
   // Once in twenty; more than five of twenty happen in one of 3,000 such tests.
   int found = 0;
   double noise = 0, all = 0;
@@ -43,13 +45,14 @@ TEST(CorrelatedPoseErrors, NoiseAloneRarelyShowsThemAndThenAddsLittle) {
     const Refinement solution = refined(make_scene(noisy(), tag_points(), seed));
     const SystematicUncertainty systematic = uncertainty_of(solution);
     found += systematic.arms.front().found;
-    EXPECT_LT(systematic.arms.front().share, 0.95);
+    const double share = systematic.arms.front().share;
+    EXPECT_LT(share / (1 - share), kOdds * 19);  // the views by themselves speak for them less than 19 to 1
     noise += solution.covariance.topLeftCorner<3, 3>().trace();
     all += systematic.covariance.topLeftCorner<3, 3>().trace();
   }
   EXPECT_LE(found, 5);
   EXPECT_GT(all, noise);
-  EXPECT_LT(all, 5 * noise);  // about twice the deviation: fields that are alike in every frame cost that
+  EXPECT_LT(all, 9 * noise);  // up to three deviations: fields that are alike in every frame cost that
 }
 
 TEST(CorrelatedPoseErrors, OfAWrongKinematicModelAreFoundAndMostlyCovered) {
