@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/calibrate/stated_uncertainty.h"
 #include "calib/solve/pose_space.h"
+#include "calib/uncertainty/smooth_errors_of_pairs.h"
 #include "data/files/error.h"
 #include "data/numbers/chi_square.h"
 
@@ -69,8 +71,10 @@ void check_halves(Calibration& result, const std::vector<PoseLoop>& loops,
   result.covariance_factor = split_inflation(checks, &worst);
   if (worst == nullptr) return;
   result.splits = {*worst};
-  result.covariance *= result.covariance_factor;
-  result.repeatable = result.covariance;
+  const double grown = growth(result.repeatable, result.covariance);
+  result.repeatable *= result.covariance_factor;
+  result.covariance *= std::max(1.0, result.covariance_factor / grown);
+  raise_to(result.repeatable, result.covariance);
   char text[300];
   std::snprintf(
       text, sizeof text,
@@ -200,6 +204,12 @@ void tell_unseen(Calibration& result, const std::vector<Observation>& observatio
              false);
 }
 
+std::vector<Eigen::Isometry3d> robot_poses(const std::vector<Observation>& observations) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Observation& observation : observations) poses.push_back(observation.T_base_gripper);
+  return poses;
+}
+
 }  // namespace
 
 Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
@@ -248,8 +258,19 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .poses = fit.poses,
                                .relative = relative_rms(compared, fit.poses.X),
                                .held_out = result.held_out});
-  if (result.size->sd > 0)
-    result.repeatable = result.covariance += covariance_of_size(loops, fit.poses, along, result.size->sd);
+  if (!axis) {
+    if (const auto smooth = smooth_errors_of_pairs(setup, robot_poses(observations), loops, fit)) {
+      result.pose_errors = smooth->arm;
+      result.covariance = smooth->covariance;
+      raise_to(result.repeatable, result.covariance);
+      tell_smooth_errors(result, growth(result.repeatable, result.covariance));
+    }
+  }
+  if (result.size->sd > 0) {
+    const Matrix6d by_size = covariance_of_size(loops, fit.poses, along, result.size->sd);
+    result.repeatable += by_size;
+    result.covariance += by_size;
+  }
   check_halves(result, loops, places, along);
   finish(result, observations);
   tell_size(result, loops, along, settings);
@@ -262,9 +283,11 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
     result.size->wanted->sd *= result.size_begun;
   }
   restore_size(result);
-  result.warnings.emplace_back(
-      "pairs of poses tell the scatter alone: what the errors of an arm's model have in common is not in the "
-      "stated standard deviations; pictures tell of it");
+  if (!result.pose_errors)
+    result.warnings.emplace_back(
+        "so few pairs of poses, or turns about one axis, tell the scatter alone: what the errors of an arm's "
+        "model have in common is "
+        "not in the stated standard deviations");
   if (compared.size() < loops.size())
     result.warnings.push_back("other methods are compared on " + std::to_string(compared.size()) + " of " +
                               std::to_string(loops.size()) + " pairs, evenly spread");

@@ -13,31 +13,6 @@ namespace {
 
 constexpr double kDegree = M_PI / 180;
 
-/// By how much the variances of `more` are larger than those of `less`, in the mean over their directions.
-double growth(const Matrix6d& less, const Matrix6d& more) {
-  return std::max(1.0, less.ldlt().solve(more).trace() / 6);
-}
-
-/// Adds what `least` has beyond `covariance`, direction by direction.
-void raise_to(const Matrix6d& least, Matrix6d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> missing(least - covariance);
-  covariance += missing.eigenvectors() * missing.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                missing.eigenvectors().transpose();
-}
-
-void tell_smooth_errors(Calibration& result, double grown) {
-  constexpr double kTold = 1.5;  // of the deviations
-  if (!result.pose_errors->found || grown < kTold * kTold) return;
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "the robot's errors change smoothly with its pose, as those of a kinematic model or a lens do: "
-      "the part common to all views cannot be observed, so its estimated size was added to the stated "
-      "standard deviations, which it raised by a factor of %.1f",
-      std::sqrt(grown));
-  result.warnings.emplace_back(text);
-}
-
 /// The parts of a recording: by how much they disagree beyond noise, factors of variances.
 struct Parts {
   double views = 1, halves = 1;
@@ -57,6 +32,29 @@ Parts parts_of(Calibration& result, const BundleSettings& settings, const Calibr
 }
 
 }  // namespace
+
+double growth(const Matrix6d& less, const Matrix6d& more) {
+  return std::max(1.0, less.ldlt().solve(more).trace() / 6);
+}
+
+void raise_to(const Matrix6d& least, Matrix6d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> missing(least - covariance);
+  covariance += missing.eigenvectors() * missing.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                missing.eigenvectors().transpose();
+}
+
+void tell_smooth_errors(Calibration& result, double grown) {
+  constexpr double kTold = 1.5;  // of the deviations
+  if (!result.pose_errors->found || grown < kTold * kTold) return;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the robot's errors change smoothly with its pose, as those of a kinematic model or a lens do: "
+      "the part common to all views cannot be observed, so its estimated size was added to the stated "
+      "standard deviations, which it raised by a factor of %.1f",
+      std::sqrt(grown));
+  result.warnings.emplace_back(text);
+}
 
 double add_uncertainty(Calibration& result, const SystematicUncertainty& systematic,
                        const BundleSettings& settings) {

@@ -9,6 +9,15 @@ namespace flash::calib {
 double add_uncertainty(Calibration& result, const SystematicUncertainty& systematic,
                        const BundleSettings& settings);
 
+/// By how much the variances of `more` are larger than those of `less`, in the mean over their directions.
+double growth(const Matrix6d& less, const Matrix6d& more);
+
+/// Adds what `least` has beyond `covariance`, direction by direction.
+void raise_to(const Matrix6d& least, Matrix6d& covariance);
+
+/// That errors which are found to change smoothly have raised the variances by `grown`.
+void tell_smooth_errors(Calibration& result, double grown);
+
 /// Raises both by as much as parts of the recording disagree beyond that: its views one by one, and halves of
 /// them, which are told. Parts of few views determine too little by themselves. smooth: what add_uncertainty
 /// returned; it is told where it raises the deviations by half beyond what parts show.

@@ -164,7 +164,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                           {"rotation_deg", to_json(sd, true)},
                           {"translation_parent_mm", to_json(in_parent, false)},
                           {"rotation_parent_deg", to_json(in_parent, true)}};
-  if (extrinsics.pixels) {
+  if (extrinsics.pixels || calibration.pose_errors) {
     const ToldDeviations here = told_deviations(calibration, calibration.repeatable, Axes::parent);
     json["predicted_sd"]["repeatable_parent_mm"] = to_json(here, false);
     json["predicted_sd"]["repeatable_parent_deg"] = to_json(here, true);

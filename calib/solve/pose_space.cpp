@@ -43,21 +43,17 @@ struct LoopRows {
 };
 
 LoopRows rows_of(const PoseLoop& loop, const HandEyePoses& poses, const CameraShare& share) {
+  const LinearLoop linear = linear_loop(loop, poses);
   const Eigen::Isometry3d predicted = poses.X.inverse() * loop.G.inverse() * poses.Z;
-  const Eigen::Isometry3d E = predicted.inverse() * loop.C;
-  const Eigen::Vector3d angle = rotation_log(E.linear());
-  Matrix6d d_Z;  // of (dt, dtheta): Exp(-z) E
-  d_Z << -Eigen::Matrix3d::Identity(), skew(E.translation()), Eigen::Matrix3d::Zero(),
-      -right_jacobian_inverse(angle) * E.linear().transpose();
-  const Matrix6d d_X = -d_Z * adjoint(predicted.inverse());
   LoopRows rows;
-  rows.sight = line_of_sight(loop, predicted);
+  rows.sight = linear.sight;
+  const Eigen::Vector3d dt = linear.residual.head<3>();
   // A residual that is the camera's grows with the size: that over the size counts.
-  const Eigen::Vector3d along = rows.sight * rows.sight.dot(E.translation());
+  const Eigen::Vector3d along = rows.sight * rows.sight.dot(dt);
   const Eigen::Vector3d d_size = predicted.linear().transpose() * loop.C.translation() -
-                                 share.across * (E.translation() - along) - share.along * along;
-  rows.translation << d_X.topRows<3>(), d_Z.topRows<3>(), d_size, E.translation();
-  rows.rotation << d_X.bottomRows<3>(), d_Z.bottomRows<3>(), Eigen::Vector3d::Zero(), angle;
+                                 share.across * (dt - along) - share.along * along;
+  rows.translation << linear.by_poses.topRows<3>(), d_size, dt;
+  rows.rotation << linear.by_poses.bottomRows<3>(), Eigen::Vector3d::Zero(), linear.residual.tail<3>();
   return rows;
 }
 
@@ -116,6 +112,20 @@ LinearModel linearize(const std::vector<PoseLoop>& loops, const PoseSpaceFit& fi
 }
 
 }  // namespace
+
+LinearLoop linear_loop(const PoseLoop& loop, const HandEyePoses& poses) {
+  const Eigen::Isometry3d predicted = poses.X.inverse() * loop.G.inverse() * poses.Z;
+  const Eigen::Isometry3d E = predicted.inverse() * loop.C;
+  const Eigen::Vector3d angle = rotation_log(E.linear());
+  LinearLoop linear;
+  linear.residual << E.translation(), angle;
+  // Exp(-z) E
+  linear.by_predicted << -Eigen::Matrix3d::Identity(), skew(E.translation()), Eigen::Matrix3d::Zero(),
+      -right_jacobian_inverse(angle) * E.linear().transpose();
+  linear.by_poses << -linear.by_predicted * adjoint(predicted.inverse()), linear.by_predicted;
+  linear.sight = line_of_sight(loop, predicted);
+  return linear;
+}
 
 std::vector<PoseLoop> resized(std::vector<PoseLoop> loops, double size) {
   for (PoseLoop& loop : loops) loop.C.translation() *= size;

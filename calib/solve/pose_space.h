@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/geometry/closed_form.h"
+#include "calib/geometry/pose.h"
 #include "calib/solve/along_prior.h"
 
 namespace flash::calib {
@@ -46,6 +47,15 @@ struct SizeUnknown {
 PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePoses& seed,
                             const std::optional<SizeUnknown>& size = {},
                             const std::optional<AlongPrior>& along = {});
+
+/// How far a pair is from closing, (dt, dtheta) as fit_pose_space() has them, and its derivatives.
+struct LinearLoop {
+  Vector6d residual;
+  Eigen::Matrix<double, 6, 12> by_poses;  ///< X, then Z, right perturbations
+  Matrix6d by_predicted;                  ///< the target's predicted pose, likewise
+  Eigen::Vector3d sight;                  ///< unit, along the line of sight; zero where there is none
+};
+LinearLoop linear_loop(const PoseLoop& loop, const HandEyePoses& poses);
 
 /// What is seen of a target that is so many times as large as stated.
 std::vector<PoseLoop> resized(std::vector<PoseLoop> loops, double size);

@@ -7,8 +7,6 @@
 #include <cmath>
 
 #include "calib/solve/linearization.h"
-#include "calib/uncertainty/pose_error_modes.h"
-#include "calib/uncertainty/pose_information.h"
 #include "data/numbers/chi_square.h"
 
 namespace flash::calib {
@@ -169,10 +167,10 @@ std::vector<std::size_t> poses_of(const std::vector<PoseInformation>& all, const
   return poses;
 }
 
-std::vector<std::size_t> thinned(const std::vector<std::size_t>& poses) {
-  if (poses.size() <= kEnough) return poses;
+std::vector<std::size_t> thinned(std::size_t poses) {
   std::vector<std::size_t> result;
-  for (std::size_t i = 0; i < kEnough; ++i) result.push_back(poses[i * poses.size() / kEnough]);
+  const std::size_t count = std::min(poses, kEnough);
+  for (std::size_t i = 0; i < count; ++i) result.push_back(i * poses / count);
   return result;
 }
 
@@ -267,6 +265,22 @@ Eigen::MatrixXd field_covariance(const std::vector<PoseModes>& modes, const std:
 
 }  // namespace
 
+ArmErrorFit fit_arm_errors(const std::vector<PoseModes>& modes, const std::vector<PoseInformation>& seen,
+                           const Eigen::MatrixXd& prior, const Eigen::Vector2d& noise) {
+  std::vector<const PoseInformation*> parts;
+  std::vector<PoseModes> some;
+  for (const std::size_t i : thinned(modes.size())) {
+    parts.push_back(&seen[i]);
+    some.push_back(modes[i]);
+  }
+  ArmErrorFit fit;
+  const std::vector<Candidate> list =
+      candidates(some, seen_errors(parts, prior), {noise[0], noise[1]}, fit.errors);
+  fit.errors.found = fit.errors.gain > kOnceInTwenty;
+  fit.covariance = field_covariance(modes, list, {noise[0], noise[1]}, fit.errors);
+  return fit;
+}
+
 PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& settings) {
   const std::vector<PoseInformation> all = pose_informations(refined, settings);
   const Eigen::MatrixXd prior = linearize(refined.bundle, refined.noise, settings).prior;
@@ -277,16 +291,14 @@ PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& 
   if (settings.unknowns.joint_zeros) return model;
   for (std::size_t arm = 0; arm < model.arms.size(); ++arm) {
     model.poses[arm] = poses_of(all, refined.bundle, arm);
-    if (model.poses[arm].size() < 8) continue;
-    const Noise noise{std::pow(refined.noise.translation[arm], 2), std::pow(refined.noise.rotation[arm], 2)};
-    const std::vector<std::size_t> some = thinned(model.poses[arm]);
-    std::vector<const PoseInformation*> parts;
-    for (const std::size_t i : some) parts.push_back(&all[i]);
-    CorrelatedPoseErrors& errors = model.arms[arm];
-    const std::vector<Candidate> list =
-        candidates(modes_of(refined.bundle, some), seen_errors(parts, prior), noise, errors);
-    errors.found = errors.gain > kOnceInTwenty;
-    model.covariance[arm] = field_covariance(modes_of(refined.bundle, model.poses[arm]), list, noise, errors);
+    if (model.poses[arm].size() < kFewestPosesOfArm) continue;
+    std::vector<PoseInformation> seen;
+    for (const std::size_t i : model.poses[arm]) seen.push_back(all[i]);
+    ArmErrorFit fit = fit_arm_errors(
+        modes_of(refined.bundle, model.poses[arm]), seen, prior,
+        {std::pow(refined.noise.translation[arm], 2), std::pow(refined.noise.rotation[arm], 2)});
+    model.arms[arm] = fit.errors;
+    model.covariance[arm] = std::move(fit.covariance);
   }
   return model;
 }

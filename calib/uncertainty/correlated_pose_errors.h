@@ -3,6 +3,8 @@
 #include <vector>
 
 #include "calib/solve/errors_in_variables.h"
+#include "calib/uncertainty/pose_error_modes.h"
+#include "calib/uncertainty/pose_information.h"
 
 namespace flash::calib {
 
@@ -25,6 +27,17 @@ struct PoseErrorModel {
   /// Of their errors (base axes, at the gripper), six a pose, times `share`; empty: too few poses to tell.
   std::vector<Eigen::MatrixXd> covariance;
 };
+
+constexpr std::size_t kFewestPosesOfArm = 8;  ///< from which anything is told of them
+
+/// Of one arm, from what its poses' errors are seen to be. prior: of the shared unknowns. noise: variances an
+/// axis of errors that are independent, of translation and of rotation, in units of the modes' columns.
+struct ArmErrorFit {
+  CorrelatedPoseErrors errors;
+  Eigen::MatrixXd covariance;  ///< of all poses, as PoseErrorModel's
+};
+ArmErrorFit fit_arm_errors(const std::vector<PoseModes>& modes, const std::vector<PoseInformation>& seen,
+                           const Eigen::MatrixXd& prior, const Eigen::Vector2d& noise);
 
 /// Beside the independent errors of each arm stand Gaussian random fields over place and attitude (Matern
 /// 5/2; Rasmussen and Williams 2006) of one size, in all ways in which a wrong kinematic model moves a

@@ -14,15 +14,17 @@ namespace {
 /// wrist, and of a stretch along the arm, one axis in three.
 constexpr double kReach = 0.6;  // [m]
 
-PoseModes mode_of(const Bundle& bundle, std::size_t i, const Eigen::Vector3d& middle) {
-  const RobotPose& pose = bundle.poses[i];
+}  // namespace
+
+PoseModes modes_at(const Eigen::Isometry3d& T_base_gripper, const Eigen::Vector3d& pivot,
+                   const Eigen::Vector3d& middle) {
   PoseModes modes;
-  modes.place = pose.T_base_gripper.translation();
-  modes.attitude = pose.T_base_gripper.linear();
-  const Eigen::Vector3d pivot = modes.attitude * bundle.pivots[static_cast<std::size_t>(pose.arm)];
+  modes.place = T_base_gripper.translation();
+  modes.attitude = T_base_gripper.linear();
+  const Eigen::Vector3d at = modes.attitude * pivot;
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), O = Eigen::Matrix3d::Zero();
   modes.translation << I, O;
-  modes.rotation << skew(pivot) * modes.attitude, modes.attitude;
+  modes.rotation << skew(at) * modes.attitude, modes.attitude;
   auto& [wrist, base, shift, shift_of_wrist, stretch] = modes.smooth;
   wrist = modes.rotation;
   const Eigen::Vector3d place = modes.place - middle;
@@ -35,14 +37,15 @@ PoseModes mode_of(const Bundle& bundle, std::size_t i, const Eigen::Vector3d& mi
   return modes;
 }
 
-}  // namespace
-
 std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::size_t>& poses) {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const std::size_t i : poses)
     middle += bundle.poses[i].T_base_gripper.translation() / static_cast<double>(poses.size());
   std::vector<PoseModes> modes;
-  for (const std::size_t i : poses) modes.push_back(mode_of(bundle, i, middle));
+  for (const std::size_t i : poses) {
+    const RobotPose& pose = bundle.poses[i];
+    modes.push_back(modes_at(pose.T_base_gripper, bundle.pivots[static_cast<std::size_t>(pose.arm)], middle));
+  }
   return modes;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <vector>
 
@@ -17,6 +17,10 @@ struct PoseModes {
   std::array<Columns, kSmooth>
       smooth;  ///< of a turn by one radian, and of lengths that are wrong in proportion
 };
+
+/// Of one pose. pivot: of its arm, in the gripper's frame; middle: of the places of all [m].
+PoseModes modes_at(const Eigen::Isometry3d& T_base_gripper, const Eigen::Vector3d& pivot,
+                   const Eigen::Vector3d& middle);
 
 /// Of some poses of a bundle.
 std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::size_t>& poses);

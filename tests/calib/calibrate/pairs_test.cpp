@@ -97,7 +97,7 @@ TEST(Pairs, OfAStreamAreComparedOnSomeOfThemAndAllSolved) {
   const Vector6d error = motion_between(result.poses.X, scene.truth.X);
   EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
   // All pairs count: scatter of 0.5 mm, by the root of 1000; X and Z share it, and turns move places.
-  EXPECT_LT(std::sqrt(result.covariance.topLeftCorner<3, 3>().trace() / 3), 5 * 0.5e-3 / std::sqrt(1000.0));
+  EXPECT_LT(std::sqrt(result.repeatable.topLeftCorner<3, 3>().trace() / 3), 5 * 0.5e-3 / std::sqrt(1000.0));
 }
 
 // A camera or a target that is knocked by 8 mm half-way: told, and stated. One that stands still is not.

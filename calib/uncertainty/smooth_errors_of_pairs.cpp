@@ -1,0 +1,74 @@
+#include "calib/uncertainty/smooth_errors_of_pairs.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace flash::calib {
+namespace {
+
+/// How a pair closes by an error of its robot pose, (dt, dtheta) in base axes at the gripper.
+Matrix6d by_error(Setup setup, const Eigen::Isometry3d& T_base_gripper, const LinearLoop& linear,
+                  const HandEyePoses& poses) {
+  Matrix6d in_gripper = Matrix6d::Zero();  // T moved(I, in_gripper e)
+  in_gripper.topLeftCorner<3, 3>() = in_gripper.bottomRightCorner<3, 3>() =
+      T_base_gripper.linear().transpose();
+  // predicted = X^-1 T^-1 Z of a camera in the hand, X^-1 T Z of one beside the robot
+  if (setup == Setup::eye_in_hand)
+    return -linear.by_predicted * adjoint(poses.Z.inverse() * T_base_gripper) * in_gripper;
+  return linear.by_predicted * adjoint(poses.Z.inverse()) * in_gripper;
+}
+
+/// Columns of unit scatter of a pair's (dt, dtheta): along the line of sight as much more as was estimated.
+Matrix6d scatter_columns(const LinearLoop& linear, const PoseSpaceFit& fit) {
+  Matrix6d columns = Matrix6d::Identity();
+  const double more = fit.translation.along / fit.translation.across - 1;
+  columns.topLeftCorner<3, 3>() += more * linear.sight * linear.sight.transpose();
+  return columns;
+}
+
+}  // namespace
+
+std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
+    Setup setup, const std::vector<Eigen::Isometry3d>& T_base_gripper, const std::vector<PoseLoop>& loops,
+    const PoseSpaceFit& fit) {
+  if (loops.size() < kFewestPosesOfArm) return std::nullopt;
+  constexpr Eigen::Index kShared = 12;
+  constexpr double kKnown =
+      0.01;  // of the variance of a pair's scatter: the rest is estimated beside each field
+  const Eigen::Vector2d noise(std::pow(fit.translation.across, 2), std::pow(fit.rotation, 2));
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(noise[0]), Eigen::Vector3d::Constant(noise[1]);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Isometry3d& T : T_base_gripper)
+    middle += T.translation() / static_cast<double>(T_base_gripper.size());
+  std::vector<PoseModes> modes;
+  std::vector<PoseInformation> seen;
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(kShared, kShared),
+                  gains(kShared, 6 * static_cast<Eigen::Index>(loops.size()));
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    const LinearLoop linear = linear_loop(loops[i], fit.poses);
+    const Matrix6d J = by_error(setup, T_base_gripper[i], linear, fit.poses),
+                   scatter = scatter_columns(linear, fit);
+    const Matrix6d W = (scatter * variances.asDiagonal() * scatter.transpose()).inverse(), known = W / kKnown;
+    information += linear.by_poses.transpose() * W * linear.by_poses;
+    gains.middleCols<6>(6 * static_cast<Eigen::Index>(i)) = linear.by_poses.transpose() * W * J;
+    seen.push_back({.H = J.transpose() * known * J,
+                    .H_s = J.transpose() * known * linear.by_poses,
+                    .H_ss = linear.by_poses.transpose() * known * linear.by_poses,
+                    .g = J.transpose() * known * linear.residual,
+                    .g_s = linear.by_poses.transpose() * known * linear.residual});
+    PoseModes& mode = modes.emplace_back(modes_at(T_base_gripper[i], Eigen::Vector3d::Zero(), middle));
+    const Matrix6d as_errors = J.partialPivLu().solve(scatter);  // which make this scatter
+    mode.translation = as_errors.leftCols<3>();
+    mode.rotation = as_errors.rightCols<3>();
+  }
+  const ArmErrorFit arm = fit_arm_errors(modes, seen, Eigen::MatrixXd::Zero(kShared + 1, kShared + 1), noise);
+  const Eigen::LDLT<Eigen::MatrixXd> shared(information);
+  // In place of the independent scatter stands, by its share, what was found.
+  const Eigen::MatrixXd instead = shared.solve(gains) * arm.covariance * shared.solve(gains).transpose();
+  const Matrix6d scatter = fit.covariance.topLeftCorner<6, 6>();
+  return SmoothErrorsOfPairs{arm.errors, (1 - arm.errors.share) * scatter + instead.topLeftCorner<6, 6>()};
+}
+
+}  // namespace flash::calib
