@@ -22,7 +22,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study use-study watch-study held-out
+.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study link-length-study use-study watch-study held-out
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
 .PHONY: cell pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
@@ -123,6 +123,10 @@ size-study: configure-test  ## Say whether hand-eye calibration states its uncer
 lens-study: configure-test  ## Say whether hand-eye calibration states truly how well it knows its lens, and what another recording differs by, over 60 fresh rigs of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target lens_study
 	$(BUILD)/tests/lens_study
+
+link-length-study: configure-test  ## Say whether lengths of an arm's links are found beside the zeros of its joints, over 30 fresh recordings of each kind
+	cmake --build $(BUILD) -j $(JOBS) --target link_length_study
+	$(BUILD)/tests/link_length_study
 
 use-study: configure-test  ## Say what each use of a hand-eye calibration (--for) gains, over 100 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target use_study

@@ -12,6 +12,7 @@
 #include "calib/calibrate/extrinsics.h"
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/robot_file.h"
+#include "calib/report/urdf_origins.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
 #include "data/files/json_reader.h"
@@ -27,7 +28,8 @@ struct ExportOptions {
   bool despite_doubts = false;
   std::string extrinsics;
   std::string to;
-  std::string into;  ///< a robot's file, to be changed; empty: none
+  std::string into;            ///< a robot's file, to be changed; empty: none
+  bool joint_origins = false;  ///< as the calibration corrects them, into that file too
   std::string parent, child;
   std::string out;
 };
@@ -55,6 +57,9 @@ std::vector<std::string> not_expressed(const ExportOptions& options, const calib
     lines.emplace_back("the lens, but in a comment");
   else if (renders && extrinsics.lens->model != data::DistortionModel::none)
     lines.emplace_back("the distortion of the lens: undistort the pictures of the camera");
+  if (!extrinsics.joint_origins.empty() && !options.joint_origins)
+    lines.emplace_back("by how much joints and links are off, which the transform holds with" +
+                       std::string(options.to == "urdf" ? ": --into with --joint-origins does" : ""));
   lines.emplace_back("the covariance of the transform, which is in " + options.extrinsics);
   return lines;
 }
@@ -75,6 +80,14 @@ std::string backup_path(const std::string& path) {
   return backup;
 }
 
+/// The robot's file with what the calibration has for it.
+std::string changed(const std::string& robot, const ExportOptions& options,
+                    const calib::Extrinsics& extrinsics) {
+  const auto with_camera = options.to == "mjcf" ? calib::camera_in_mjcf : calib::camera_in_urdf;
+  const std::string is = with_camera(robot, options.into, extrinsics.transform, extrinsics.lens);
+  return options.joint_origins ? calib::with_joint_origins(is, options.into, extrinsics.joint_origins) : is;
+}
+
 int run_export(const ExportOptions& options) {
   const bool changes = !options.into.empty();
   if (changes == !options.out.empty())
@@ -82,9 +95,16 @@ int run_export(const ExportOptions& options) {
                            ", expected the robot's file to change, or a file to write");
   if (changes && options.to != "urdf" && options.to != "xacro" && options.to != "mjcf")
     throw data::InputError("--into: found --to " + options.to + ", expected urdf, xacro or mjcf");
+  if (options.joint_origins && !(changes && options.to == "urdf"))
+    throw data::InputError("--joint-origins: found " +
+                           (changes ? "--to " + options.to : std::string("no --into")) +
+                           ", expected --to urdf --into the robot's file");
   if (!changes) data::check_file_free(options.out, options.common.force);
   expect_own_files({options.out}, {options.extrinsics, options.into});
   calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.despite_doubts);
+  if (options.joint_origins && extrinsics.joint_origins.empty())
+    throw data::input_error(options.extrinsics, "joint_origins",
+                            "found none, expected a calibration of joints (handeye --robot)");
   if (!options.parent.empty()) extrinsics.transform.parent = options.parent;
   if (!options.child.empty()) extrinsics.transform.child = options.child;
   expect_frame_names(extrinsics.transform.parent, extrinsics.transform.child);
@@ -97,8 +117,7 @@ int run_export(const ExportOptions& options) {
   if (changes) {
     const std::string was = data::read_file(options.into);
     const std::string file = file_to_change(options.into);
-    const auto with_camera = options.to == "mjcf" ? calib::camera_in_mjcf : calib::camera_in_urdf;
-    const std::string is = with_camera(was, options.into, extrinsics.transform, extrinsics.lens);
+    const std::string is = changed(was, options, extrinsics);
     backup = backup_path(file);
     const fs::perms permissions = fs::status(file).permissions();
     data::write_together({{backup, was}, {file, is}});
@@ -141,6 +160,9 @@ void add_export_verb(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"urdf", "xacro", "tf", "mjcf", "usd", "easy_handeye2", "opencv"}));
   verb->add_option("--into", options->into,
                    "The robot's file, which gets the camera; it is kept beside as FILE.bak");
+  verb->add_flag("--joint-origins", options->joint_origins,
+                 "Of a calibration with --robot: put the zeros of the joints, and the lengths of links where "
+                 "they were solved for, into the origins of the URDF too");
   verb->add_option("--parent-frame", options->parent,
                    "The link or body that carries the camera; without it, as the calibration names it");
   verb->add_option("--child-frame", options->child, "The camera; without it, as the calibration names it");

@@ -21,7 +21,7 @@
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/extrinsics_json.h"
 #include "calib/report/report.h"
-#include "calib/uncertainty/joint_zeros.h"
+#include "calib/uncertainty/joint_errors.h"
 #include "data/camera/camera_info.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
@@ -135,6 +135,40 @@ void print_lens(const calib::Calibration& c) {
         1e3 * shift.head<3>().norm(), shift.tail<3>().norm() * 180 / M_PI);
 }
 
+/// "x", or the three numbers.
+std::string direction_name(const Eigen::Vector3d& direction) {
+  for (Eigen::Index i = 0; i < 3; ++i)
+    if (direction == Eigen::Vector3d::Unit(i)) return std::string(1, "xyz"[i]);
+  return "(" + fixed(direction.x(), 2) + ", " + fixed(direction.y(), 2) + ", " + fixed(direction.z(), 2) +
+         ")";
+}
+
+/// Each error of the arm's joints, with its interval.
+void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
+  const auto errors = calib::joint_errors(c.refined.bundle, c.unknowns, c.shared_covariance);
+  if (!errors || !extrinsics.inputs.arm) return;
+  const calib::ArmModel& arm = *extrinsics.inputs.arm;
+  const auto line = [&](const std::string& what, Eigen::Index i, double scale, const char* unit) {
+    const Eigen::Vector2d interval = scale * errors->interval(i);
+    std::printf("  %-32s %8s %s (%s to %s)%s\n", what.c_str(), fixed(scale * errors->estimate[i], 3).c_str(),
+                unit, fixed(interval[0], 3).c_str(), fixed(interval[1], 3).c_str(),
+                errors->told(i) ? "" : " not told");
+  };
+  std::printf("joints are farther than they say by (95 %% intervals; not told: known as before at best):\n");
+  Eigen::Index next = 0;
+  for (const std::string& name : calib::moving_joints(arm.chain)) line(name, next++, 180 / M_PI, "deg");
+  if (arm.lengths.empty()) {
+    std::printf(
+        "  the links were taken as the URDF has them: where they may be off by 0.3 mm, the deviations do not "
+        "hold (--link-lengths solves for them)\n");
+    return;
+  }
+  std::printf("origins of joints are farther than the URDF says by:\n");
+  for (const calib::LinkLength& length : arm.lengths)
+    line(arm.chain.joints[length.joint].name + " along " + direction_name(length.direction), next++, 1e3,
+         "mm");
+}
+
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   const Eigen::Vector3d t = extrinsics.transform.T.translation();
   constexpr double kDegrees = 180 / M_PI;
@@ -171,14 +205,7 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   } else if (c.size && c.size->sd > 0) {
     std::printf("target: %.4f +- %.4f times as large as stated\n", c.size->estimate, c.size->sd);
   }
-  if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
-    std::printf("joints are farther than they say by");
-    for (Eigen::Index i = 0; i < zeros->estimate.size(); ++i)
-      std::printf(" %s +- %.3f", fixed(kDegrees * zeros->estimate[i], 3).c_str(), kDegrees * zeros->sd[i]);
-    std::printf(
-        " deg; the links were taken as the URDF has them: where they may be off by 0.3 mm, the deviations do "
-        "not hold\n");
-  }
+  print_joints(c, extrinsics);
   const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
   if (depth && depth->used)
     std::printf("depth of %d views: plane of the target known to %.2f mm, a pixel to %.2f mm\n", depth->views,
@@ -298,7 +325,8 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   const calib::ExtrinsicsInputs inputs = calib::relative_to(
       {dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
        dataset.poses_path, dataset.camera_path, solved.refiner, solved.depth, solved.time_offset,
-       options.dataset.robot, options.dataset.base_link, options.dataset.tip_link},
+       options.dataset.robot, options.dataset.base_link, options.dataset.tip_link,
+       options.dataset.link_length_sd, dataset.arm},
       options.out);
   calib::Extrinsics extrinsics = calib::extrinsics_of(solved.calibration, inputs);
   const int exit_code = solved.calibration.usable ? exit_done : exit_unusable;
@@ -345,6 +373,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<HandEyeOptions>();
   CLI::App* verb = app.add_subcommand("handeye", "Where the camera sits, in the hand or before the robot");
   add_dataset_options(*verb, options->dataset);
+  add_link_option(*verb, options->dataset);
   add_setup_option(*verb, options->setup);
   verb->add_option_function<std::string>(
           "--for", [options](const std::string& name) { options->use = *calib::use_named(name); },

@@ -36,6 +36,25 @@ void add_robot_options(CLI::App& group, DatasetChoice& choice) {
   group.add_option("--tip-link", choice.tip_link, "Link of the URDF that is the gripper")->needs(robot);
 }
 
+void add_link_option(CLI::App& verb, DatasetChoice& choice) {
+  verb.add_option_function<std::string>(
+          "--link-lengths",
+          [&choice](const std::string& text) {
+            constexpr double kMost = 50;  // of which no link is off [mm]
+            const std::optional<double> sd =
+                text == "usual" ? 1e3 * calib::kUsualLinkLength : data::parse_number(text);
+            if (!sd || !(*sd > 0 && *sd <= kMost))
+              throw CLI::ValidationError("--link-lengths", "found \"" + text +
+                                                               "\", expected usual, or millimetres above 0, "
+                                                               "up to 50");
+            choice.link_length_sd = 1e-3 * *sd;
+          },
+          "Solve for the lengths of the arm's links too, each known to so many millimetres (one standard "
+          "deviation); usual: 0.3, as machined parts")
+      ->type_name("MM|usual")
+      ->needs(verb.get_option("--robot"));
+}
+
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   CLI::App& group = *verb.add_option_group("Dataset");
   group.add_option("dataset", choice.path, "Folder of pictures and poses, or a file of pose pairs")
@@ -136,6 +155,7 @@ calib::DatasetOptions dataset_options(const DatasetChoice& choice) {
   options.robot = choice.robot;
   options.base_link = choice.base_link;
   options.tip_link = choice.tip_link;
+  options.link_length_sd = choice.link_length_sd;
   options.depth_scale = choice.depth_scale;
   options.depth = !choice.no_depth;
   return options;

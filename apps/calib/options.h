@@ -33,11 +33,14 @@ struct DatasetChoice {
   std::string camera;
   std::string angles;
   std::string robot, base_link, tip_link;
+  double link_length_sd = 0;  ///< [m]; 0: links are as the URDF has them
   std::string cache;
   double depth_scale = 0.001;
   bool no_depth = false;
 };
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
+/// --link-lengths, of verbs that have --robot and solve for it.
+void add_link_option(CLI::App& verb, DatasetChoice& choice);
 /// Those of a URDF alone, which the former have.
 void add_robot_options(CLI::App& group, DatasetChoice& choice);
 

@@ -186,6 +186,7 @@ std::vector<Recording> recordings_of_arms(const std::vector<std::string>& arms,
     if (!inputs.robot.empty()) choice.robot = calib::resolved(inputs.robot, file);
     choice.base_link = inputs.base_link;
     choice.tip_link = inputs.tip_link;
+    choice.link_length_sd = inputs.link_length_sd;
     choice.target = target_text(inputs.target, file);
     choice.cache = options.cache;
     choice.no_depth = options.no_depth || !inputs.depth;
@@ -206,6 +207,7 @@ std::vector<Recording> recordings_of_cameras(const RegisterOptions& options) {
     choice.robot = options.robot.robot;
     choice.base_link = options.robot.base_link;
     choice.tip_link = options.robot.tip_link;
+    choice.link_length_sd = options.robot.link_length_sd;
     choice.target = options.target;
     choice.cache = options.cache;
     choice.depth_scale = options.depth_scale;
@@ -423,6 +425,7 @@ void add_register_verb(CLI::App& app, Action& action) {
                    "eye-in-hand or eye-to-hand, where the datasets of --cameras do not say")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
   add_robot_options(*verb, options->robot);
+  add_link_option(*verb, options->robot);
   add_vector_option(*verb, "--workspace", options->workspace,
                     "Point in the first base where the uncertainty is stated [m]");
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");

@@ -88,6 +88,7 @@ void add_watch_verb(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand(
       "watch", "A page that follows a recording: what was found, what is not covered, the next pose");
   add_dataset_options(*verb, options->dataset);
+  add_link_option(*verb, options->dataset);
   add_setup_option(*verb, options->setup);
   add_lens_option(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd, options->size_as_stated);

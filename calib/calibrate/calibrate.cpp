@@ -406,7 +406,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0 && !settings.size_as_stated;
   refine_settings.bundle.unknowns.warps = refine_settings.bundle.unknowns.edge_offsets = true;
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
-  refine_settings.bundle.unknowns.joint_zeros = observations.front().joint_motions.cols() > 0;
+  refine_settings.bundle.unknowns.joint_errors = observations.front().joint_motions.cols() > 0;
   result.unknowns = refine_settings.bundle.unknowns;
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
   const std::string noisy = implausible_noise(result.refined.noise, observations);
@@ -426,7 +426,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
 
   const Bundle& bundle = result.refined.bundle;
   std::optional<PixelFit> pixels;
-  if (settings.use == Use::image && !result.unknowns.joint_zeros && !result.along)
+  if (settings.use == Use::image && !result.unknowns.joint_errors && !result.along)
     pixels = fit_pixels(result.refined, refine_settings.bundle,
                         fit_pose_errors(result.refined, refine_settings.bundle));
   compare_methods(result, observations, plain, pixels, refine_settings, settings);

@@ -76,16 +76,17 @@ void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout
   }
 }
 
-/// Zeros of joints, where all arms have their joints known: errors of an arm are those of its joints, or
-/// smooth.
-void add_joint_zeros(Bundle& bundle, std::vector<std::string>* notices) {
-  std::vector<Eigen::Index> joints(bundle.bases.size(), 0);
-  for (const RobotPose& pose : bundle.poses)
-    joints[static_cast<std::size_t>(pose.arm)] = pose.joint_motions.cols();
-  const auto known = std::count_if(joints.begin(), joints.end(), [](Eigen::Index n) { return n > 0; });
+/// Errors of joints, where all arms have their joints known: those of an arm are of its joints, or smooth.
+/// sd: of each arm, beforehand; empty where its joints are not known.
+void add_joint_errors(const std::vector<Eigen::VectorXd>& sd, Bundle& bundle,
+                      std::vector<std::string>* notices) {
+  const auto known =
+      std::count_if(sd.begin(), sd.end(), [](const Eigen::VectorXd& of_arm) { return of_arm.size() > 0; });
   if (known == 0) return;
-  if (known == static_cast<std::ptrdiff_t>(joints.size())) {
-    for (const Eigen::Index count : joints) bundle.joint_zeros.emplace_back(Eigen::VectorXd::Zero(count));
+  if (known == static_cast<std::ptrdiff_t>(sd.size())) {
+    bundle.joint_error_sd = sd;
+    for (const Eigen::VectorXd& of_arm : sd)
+      bundle.joint_errors.emplace_back(Eigen::VectorXd::Zero(of_arm.size()));
     return;
   }
   for (RobotPose& pose : bundle.poses) pose.joint_motions.resize(6, 0);
@@ -172,6 +173,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   bundle.priors.lenses.resize(cameras.size());
   bundle.priors.warp_sd.resize(layout.targets.size());
   bundle.priors.scale_sd.resize(layout.targets.size());
+  std::vector<Eigen::VectorXd> joint_sd(arms.size());
   std::map<std::pair<std::size_t, double>, std::vector<int>> poses_at;
   for (const CellMember& given : members) {
     if (given.setup != bundle.setup)
@@ -207,6 +209,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
         pose.arm = static_cast<int>(arm);
         pose.T_base_gripper = observation.T_base_gripper;
         pose.joint_motions = observation.joint_motions;
+        joint_sd[arm] = joint_error_sd(observation);
         bundle.poses.push_back(pose);
       }
       BundleView view = make_view(member.points, observation);
@@ -222,7 +225,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   bundle.scales.assign(bundle.targets.size(), 1.0);
   bundle.time_offsets.assign(bundle.bases.size(), 0.0);
   bundle.pivots.assign(bundle.bases.size(), Eigen::Vector3d::Zero());
-  add_joint_zeros(bundle, notices);
+  add_joint_errors(joint_sd, bundle, notices);
   return bundle;
 }
 
@@ -238,7 +241,7 @@ Cell solve_cell(const std::vector<CellMember>& all, const CellSettings& given) {
   Bundle start = cell_bundle(members, &cell.notices);
   std::vector<double> size_sd = start.priors.scale_sd;
   if (given.target_size_sd) size_sd.assign(start.targets.size(), *given.target_size_sd);
-  settings.bundle.unknowns.joint_zeros = !start.joint_zeros.empty();
+  settings.bundle.unknowns.joint_errors = !start.joint_errors.empty();
   if (given.lens == LensKnowledge::unknown) start.priors.lenses.clear();
   if (as_stated || unknown_sizes)
     start.priors.scale_sd.clear();

@@ -36,7 +36,7 @@ Refinement refined(const std::vector<CellMember>& others) {
   RefineSettings settings;
   settings.bundle.unknowns.warps = settings.bundle.unknowns.edge_offsets = true;
   Bundle bundle = cell_bundle(without_wrong_poses(others));
-  settings.bundle.unknowns.joint_zeros = !bundle.joint_zeros.empty();
+  settings.bundle.unknowns.joint_errors = !bundle.joint_errors.empty();
   return refine(std::move(bundle), settings);
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "calib/uncertainty/joint_errors.h"
 #include "data/files/error.h"
 #include "data/files/json_reader.h"
 
@@ -75,6 +76,14 @@ Warp read_warp(const data::JsonObject& scale) {
   return warp;
 }
 
+Eigen::Isometry3d read_origin(const data::JsonObject& origin) {
+  origin.expect_fields({"xyz", "rpy"});
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = origin.vector("xyz", 3);
+  T.linear() = rotation_of_rpy(origin.vector("rpy", 3));
+  return T;
+}
+
 }  // namespace
 
 Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs) {
@@ -95,6 +104,9 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
     extrinsics.lens = calibration.refined.bundle.intrinsics.front();
     extrinsics.stated_lens = with_vector(*extrinsics.lens, calibration.lens.stated);
   }
+  const auto errors =
+      joint_errors(calibration.refined.bundle, calibration.unknowns, calibration.shared_covariance);
+  if (errors && inputs.arm) extrinsics.joint_origins = joint_origins(*inputs.arm, errors->estimate);
   extrinsics.inputs = inputs;
   return extrinsics;
 }
@@ -169,6 +181,11 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
       depth.scale = from.positive("depth_scale");
     }
   }
+  for (const data::JsonObject& origin : object.objects("joint_origins"))
+    extrinsics.joint_origins.push_back({origin.string("joint"), read_origin(origin.object("described")),
+                                        read_origin(origin.object("corrected"))});
+  if (object.has("link_lengths"))
+    extrinsics.inputs.link_length_sd = 1e-3 * object.object("link_lengths").positive("prior_sd_mm");
   if (object.has("time_offset")) {
     const data::JsonObject offset = object.object("time_offset");
     extrinsics.inputs.time_offset = {offset.number("estimate_s"), offset.not_negative("sd_s")};

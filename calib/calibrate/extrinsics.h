@@ -19,6 +19,8 @@ struct ExtrinsicsInputs {
   std::optional<DepthUse> depth = {};
   std::optional<TimeOffset> time_offset = {};
   std::string robot = {}, base_link = {}, tip_link = {};  ///< URDF whose joints the poses are, as load_urdf
+  double link_length_sd = 0;                              ///< as in DatasetOptions [m]
+  std::optional<ArmModel> arm = {};                       ///< what that URDF says; not read from a file
 };
 
 /// The same with paths as a reader of the file `out` needs them: relative to its folder, so that file and
@@ -57,8 +59,9 @@ struct Extrinsics {
       held_out;        ///< rms of the target's pose in views left out; none in files without
   bool pixels = true;  ///< false: of pose pairs, which have no corners
   Use use = Use::workspace;
-  std::vector<std::string> warnings;  ///< of the calibration, worst first
-  bool usable = true;                 ///< false: it ended with exit code 3
+  std::vector<std::string> warnings;       ///< of the calibration, worst first
+  bool usable = true;                      ///< false: it ended with exit code 3
+  std::vector<JointOrigin> joint_origins;  ///< of the arm that the transform holds with; none of poses
   ExtrinsicsInputs inputs;
 };
 

@@ -160,8 +160,9 @@ class PosePairing {
   bool by_number() const { return !by_time_ && !named_ && !in_order_; }
 
   /// place: of the picture among all, in order. Throws InputError where it has no pose.
-  /// robot: whose joints the poses came as, or null.
-  void pair(Frame& frame, const fs::path& image, std::size_t place, const SerialChain* robot) const {
+  /// arm: whose joints the poses came as, or none.
+  void pair(Frame& frame, const fs::path& image, std::size_t place,
+            const std::optional<ArmModel>& arm) const {
     const data::RecordedPose* found = nullptr;
     if (in_order_) {
       found = &poses_.at(place);
@@ -190,7 +191,9 @@ class PosePairing {
     }
     frame.T_base_gripper = found->pose;
     frame.angles = found->angles;
-    if (robot && found->joints.size() > 0) frame.joint_motions = joint_motions(*robot, found->joints);
+    if (!arm || found->joints.size() == 0) return;
+    frame.joint_motions = error_motions(*arm, found->joints);
+    frame.joint_sd = prior_deviations(*arm);
   }
 
   data::Trajectory stream() const {
@@ -330,16 +333,20 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
         "such pictures");
   dataset.poses_path = choose_poses(folder, options);
   std::optional<PosePairing> pairing;
-  std::optional<SerialChain> robot;
   std::size_t poses = 0;
   if (!dataset.poses_path.empty()) {
     if (!options.robot.empty()) {
-      robot = load_urdf(options.robot, options.base_link, options.tip_link);
+      ArmModel& arm = dataset.arm.emplace();
+      arm.chain = load_urdf(options.robot, options.base_link, options.tip_link);
+      if (options.link_length_sd > 0) {
+        arm.lengths = link_lengths(arm.chain);
+        arm.length_sd = options.link_length_sd;
+      }
       dataset.files.push_back(options.robot);
     }
     for (const fs::path& file : files_of_poses(dataset.poses_path)) dataset.files.push_back(file.string());
-    data::PoseList list =
-        robot ? load_joint_list(dataset.poses_path, *robot) : load_poses(dataset.poses_path);
+    data::PoseList list = dataset.arm ? load_joint_list(dataset.poses_path, dataset.arm->chain)
+                                      : load_poses(dataset.poses_path);
     poses = list.poses.size();
     if (list.in_order && poses != images.size())
       throw InputError(dataset.poses_path + ": found " + std::to_string(poses) +
@@ -365,7 +372,7 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
         dataset.files.push_back(frame.depth = depth.string());
     }
     try {
-      if (pairing) pairing->pair(frame, image, place, robot ? &*robot : nullptr);
+      if (pairing) pairing->pair(frame, image, place, dataset.arm);
       dataset.frames.push_back(std::move(frame));
     } catch (const InputError& error) {
       unpaired.emplace_back(error.what());
@@ -375,7 +382,7 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
   for (const std::string& reason : unpaired) dataset.guesses.push_back(reason + "; it is left out");
   std::stable_sort(dataset.frames.begin(), dataset.frames.end(),
                    [](const Frame& a, const Frame& b) { return a.stamp < b.stamp; });
-  if (robot && pairing->by_time())
+  if (dataset.arm && pairing->by_time())
     throw InputError(dataset.poses_path +
                      ": found joints over time, expected one line a picture, by its number or name");
   if (pairing && pairing->by_time()) dataset.stream = pairing->stream();

@@ -5,6 +5,7 @@
 
 #include "calib/dataset/lens_file.h"
 #include "calib/dataset/observation.h"
+#include "calib/geometry/arm_model.h"
 #include "data/camera/camera.h"
 #include "data/motion/trajectory.h"
 
@@ -19,7 +20,8 @@ struct Frame {
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
   std::optional<Eigen::Vector3d> angles;  ///< the rotation as written, where it came as angles [rad]
   std::optional<Eigen::Isometry3d> T_camera_target;             ///< in a set of pairs
-  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< of the gripper, where joints are known
+  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< as in Observation
+  Eigen::VectorXd joint_sd = {};                                ///< likewise
 };
 
 struct Dataset {
@@ -31,6 +33,7 @@ struct Dataset {
   std::optional<LensCovariance> lens_covariance;  ///< where the file states one
   std::vector<Frame> frames;                      ///< in order of stamp
   std::optional<data::Trajectory> stream;         ///< poses over time, where pictures fall between them
+  std::optional<ArmModel> arm;                    ///< whose joints the poses came as
   double depth_scale = 0.001;                     ///< [m] a count of the depth pictures
   std::optional<Setup> setup;                     ///< as target.json says it
   std::string target;                             ///< as target.json says it, for parse_target; or empty
@@ -43,9 +46,10 @@ struct DatasetOptions {
   std::string camera = {};  ///< intrinsics file; empty: found by name in the dataset
   std::string robot = {};   ///< URDF: the poses are joints of this robot; empty: they are poses
   std::string base_link = {}, tip_link = {};  ///< of the robot, as load_urdf
-  std::string angles = {};   ///< what three angles of a pose mean, see rotation_from_angles; empty: "xyz"
-  bool needs_poses = true;   ///< without: pictures alone, as for intrinsics
-  bool needs_camera = true;  ///< of sets with pictures
+  double link_length_sd = 0;  ///< of each link of the robot, an unknown [m]; 0: links are as described
+  std::string angles = {};    ///< what three angles of a pose mean, see rotation_from_angles; empty: "xyz"
+  bool needs_poses = true;    ///< without: pictures alone, as for intrinsics
+  bool needs_camera = true;   ///< of sets with pictures
   double depth_scale = 0.001;
   bool depth = true;  ///< look for depth pictures
 };

@@ -22,7 +22,8 @@ struct Observation {
   Eigen::Matrix<double, 6, 1> velocity =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; of a stream
   Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions =
-      {};  ///< as joint_motions(), where joints are known
+      {};                         ///< as joint_motions() or error_motions(), where joints are known
+  Eigen::VectorXd joint_sd = {};  ///< as prior_deviations(), of each of these; empty: kUsualJointZero
 };
 
 /// The closed chain through each view, with the first pose of its target.

@@ -52,15 +52,7 @@ Joint joint_of(const tinyxml2::XMLElement& element, const std::string& path) {
   else if (kind != "fixed")
     throw input_error(path, field,
                       "found type \"" + kind + "\", expected revolute, continuous, prismatic or fixed");
-  const tinyxml2::XMLElement* const origin = element.FirstChildElement("origin");
-  const Eigen::Vector3d rpy =
-      three_numbers(attribute(origin, "rpy"), Eigen::Vector3d::Zero(), path, field + ", rpy");
-  joint.origin.translation() =
-      three_numbers(attribute(origin, "xyz"), Eigen::Vector3d::Zero(), path, field + ", xyz");
-  joint.origin.linear() = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                           Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                           Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                              .toRotationMatrix();
+  joint.origin = urdf_origin(element, path);
   joint.axis = three_numbers(attribute(element.FirstChildElement("axis"), "xyz"), Eigen::Vector3d::UnitX(),
                              path, field + ", axis");
   if (joint.kind == Joint::Kind::fixed) return joint;
@@ -81,6 +73,16 @@ std::string only(const std::set<std::string>& links, const std::string& path, co
 }
 
 }  // namespace
+
+Eigen::Isometry3d urdf_origin(const tinyxml2::XMLElement& joint, const std::string& path) {
+  const tinyxml2::XMLElement* const origin = joint.FirstChildElement("origin");
+  const std::string field = "joint " + attribute(&joint, "name");
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = rotation_of_rpy(three_numbers(attribute(origin, "rpy"), none, path, field + ", rpy"));
+  T.translation() = three_numbers(attribute(origin, "xyz"), none, path, field + ", xyz");
+  return T;
+}
 
 SerialChain load_urdf(const std::string& path, const std::string& base, const std::string& tip) {
   const std::string text = data::read_file(path);

@@ -3,6 +3,10 @@
 
 #include "calib/geometry/serial_chain.h"
 
+namespace tinyxml2 {
+class XMLElement;
+}
+
 namespace flash::calib {
 
 /// The joints of a URDF from the link `base` to the link `tip`. Empty: the link without a parent, and the
@@ -10,5 +14,9 @@ namespace flash::calib {
 /// data::InputError where the file is no such XML, links are missing or `tip` hangs on no chain from `base`,
 /// and where a joint is of another kind or follows another.
 SerialChain load_urdf(const std::string& path, const std::string& base = "", const std::string& tip = "");
+
+/// Where an element `joint` of a URDF stands in the frame of the joint before. `path` is for messages. Throws
+/// data::InputError where it is not numbers.
+Eigen::Isometry3d urdf_origin(const tinyxml2::XMLElement& joint, const std::string& path);
 
 }  // namespace flash::calib

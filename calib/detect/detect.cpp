@@ -24,6 +24,7 @@ Observation observe(const Frame& frame, const Target& target, const Sighting& si
   observation.image = frame.name;
   observation.T_base_gripper = frame.T_base_gripper;
   observation.joint_motions = frame.joint_motions;
+  observation.joint_sd = frame.joint_sd;
   observation.points = sighting.points;
   observation.pixels.resize(2, static_cast<Eigen::Index>(sighting.pixels.size()));
   for (std::size_t i = 0; i < sighting.pixels.size(); ++i)

@@ -26,6 +26,20 @@ Eigen::Vector3d rotation_log(const Eigen::Matrix3d& R) {
   return 2 * std::atan2(sine, q.w()) / sine * q.vec();
 }
 
+Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& R) {
+  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
+  // At a pitch of 90 deg only the sum or difference of the others counts: all of it becomes yaw.
+  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9) return {0, pitch, std::atan2(-R(0, 1), R(1, 1))};
+  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
+}
+
+Eigen::Matrix3d rotation_of_rpy(const Eigen::Vector3d& rpy) {
+  return (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
 double rotation_angle(const Eigen::Matrix3d& R) { return rotation_log(R).norm(); }
 
 Eigen::Isometry3d moved(const Eigen::Isometry3d& T, const Vector6d& xi) {

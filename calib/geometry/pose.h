@@ -14,6 +14,10 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& v);
 Eigen::Vector3d rotation_log(const Eigen::Matrix3d& R);
 
+/// Roll, pitch, yaw about fixed x, y, z, R = Rz(yaw) Ry(pitch) Rx(roll), and back [rad].
+Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& R);
+Eigen::Matrix3d rotation_of_rpy(const Eigen::Vector3d& rpy);
+
 /// Angle of a rotation, 0 to pi [rad].
 double rotation_angle(const Eigen::Matrix3d& R);
 

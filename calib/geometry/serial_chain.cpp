@@ -1,11 +1,7 @@
 #include "calib/geometry/serial_chain.h"
 
-#include "calib/geometry/pose.h"
-
 namespace flash::calib {
-namespace {
 
-/// (dt, dtheta) of the joint's own frame per unit of the joint.
 Vector6d motion_of(const Joint& joint) {
   Vector6d xi = Vector6d::Zero();
   if (joint.kind == Joint::Kind::revolute) xi.tail<3>() = joint.axis;
@@ -13,8 +9,7 @@ Vector6d motion_of(const Joint& joint) {
   return xi;
 }
 
-/// The gripper in the frame of each joint, moved by it; the last entry is of the gripper itself.
-std::vector<Eigen::Isometry3d> after_each(const SerialChain& chain, const Eigen::VectorXd& q) {
+std::vector<Eigen::Isometry3d> gripper_behind(const SerialChain& chain, const Eigen::VectorXd& q) {
   std::vector<Eigen::Isometry3d> poses(chain.joints.size() + 1, Eigen::Isometry3d::Identity());
   Eigen::Index moving = q.size();
   for (std::size_t k = chain.joints.size(); k-- > 0;) {
@@ -25,8 +20,6 @@ std::vector<Eigen::Isometry3d> after_each(const SerialChain& chain, const Eigen:
   return poses;
 }
 
-}  // namespace
-
 std::vector<std::string> moving_joints(const SerialChain& chain) {
   std::vector<std::string> names;
   for (const Joint& joint : chain.joints)
@@ -35,11 +28,11 @@ std::vector<std::string> moving_joints(const SerialChain& chain) {
 }
 
 Eigen::Isometry3d gripper_pose(const SerialChain& chain, const Eigen::VectorXd& q) {
-  return after_each(chain, q).front();
+  return gripper_behind(chain, q).front();
 }
 
 Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions(const SerialChain& chain, const Eigen::VectorXd& q) {
-  const std::vector<Eigen::Isometry3d> poses = after_each(chain, q);
+  const std::vector<Eigen::Isometry3d> poses = gripper_behind(chain, q);
   Eigen::Matrix<double, 6, Eigen::Dynamic> J(6, q.size());
   Eigen::Index column = 0;
   for (std::size_t k = 0; k < chain.joints.size(); ++k)

@@ -1,21 +1,13 @@
 #include "calib/report/extrinsics_export.h"
 
 #include <cctype>
-#include <cmath>
 #include <cstdio>
 
+#include "calib/geometry/pose.h"
 #include "data/motion/trajectory.h"
 
 namespace flash::calib {
 namespace {
-
-/// Roll, pitch, yaw about fixed x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll).
-Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& R) {
-  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-  // At a pitch of 90 deg only the sum or difference of the others counts: all of it becomes yaw.
-  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9) return {0, pitch, std::atan2(-R(0, 1), R(1, 1))};
-  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
-}
 
 template <class... Values>
 std::string formatted(const char* format, const Values&... values) {

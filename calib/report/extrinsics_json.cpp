@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/report/json_list.h"
-#include "calib/uncertainty/joint_zeros.h"
+#include "calib/uncertainty/joint_errors.h"
 #include "data/camera/posed_lens.h"
 #include "data/motion/trajectory.h"
 
@@ -113,6 +113,51 @@ Json along_json(const PlaceAlong& along, const HandEyePoses& poses) {
                         {"height_m", measured->height},
                         {"sd_m", measured->sd}};
   return json;
+}
+
+/// Of `count` errors from the `first` on, in degrees or millimetres.
+Json errors_json(const JointErrors& errors, Eigen::Index first, Eigen::Index count, double scale,
+                 const std::string& unit) {
+  Json json = {{"estimate_" + unit, list(Eigen::VectorXd(scale * errors.estimate.segment(first, count)))},
+               {"sd_" + unit, list(Eigen::VectorXd(scale * errors.sd.segment(first, count)))}};
+  Json intervals = Json::array(), told = Json::array();
+  for (Eigen::Index i = first; i < first + count; ++i) {
+    intervals.push_back(list(Eigen::Vector2d(scale * errors.interval(i))));
+    told.push_back(errors.told(i));
+  }
+  json["interval_" + unit] = std::move(intervals);
+  json["told"] = std::move(told);
+  return json;
+}
+
+Json origin_json(const Eigen::Isometry3d& origin) {
+  return {{"xyz", list(origin.translation())}, {"rpy", list(roll_pitch_yaw(origin.linear()))}};
+}
+
+/// Zeros of joints, lengths of links, and the origins of joints with both.
+void add_joint_errors(const Calibration& calibration, const Extrinsics& extrinsics, Json& json) {
+  for (const char* field : {"joint_zeros", "link_lengths", "joint_origins"}) json[field] = nullptr;
+  const auto errors =
+      joint_errors(calibration.refined.bundle, calibration.unknowns, calibration.shared_covariance);
+  if (!errors || !extrinsics.inputs.arm) return;
+  const ArmModel& arm = *extrinsics.inputs.arm;
+  const auto lengths = static_cast<Eigen::Index>(arm.lengths.size()), zeros = errors->sd.size() - lengths;
+  json["joint_zeros"] = {{"joints", moving_joints(arm.chain)}};
+  json["joint_zeros"].update(errors_json(*errors, 0, zeros, kDegrees, "deg"));
+  json["joint_origins"] = Json::array();
+  for (const JointOrigin& origin : extrinsics.joint_origins)
+    json["joint_origins"].push_back({{"joint", origin.joint},
+                                     {"described", origin_json(origin.described)},
+                                     {"corrected", origin_json(origin.corrected)}});
+  if (lengths == 0) return;
+  Json joints = Json::array(), directions = Json::array();
+  for (const LinkLength& length : arm.lengths) {
+    joints.push_back(arm.chain.joints[length.joint].name);
+    directions.push_back(list(Eigen::Vector3d(length.direction.array() + 0.0)));  // no minus zero
+  }
+  json["link_lengths"] = {
+      {"prior_sd_mm", 1e3 * arm.length_sd}, {"joints", joints}, {"directions", directions}};
+  json["link_lengths"].update(errors_json(*errors, zeros, lengths, 1e3, "mm"));
 }
 
 Json depth_json(const DepthUse& depth) {
@@ -254,11 +299,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                                {"moved_mm", list(Eigen::Vector3d(1e3 * motion.head<3>()))},
                                {"moved_deg", list(Eigen::Vector3d(kDegrees * motion.tail<3>()))}};
   }
-  json["joint_zeros"] = nullptr;
-  if (const auto zeros =
-          joint_zeros(calibration.refined.bundle, calibration.unknowns, calibration.shared_covariance))
-    json["joint_zeros"] = {{"estimate_deg", list(Eigen::VectorXd(kDegrees * zeros->estimate))},
-                           {"sd_deg", list(Eigen::VectorXd(kDegrees * zeros->sd))}};
+  add_joint_errors(calibration, extrinsics, json);
   json["smooth_errors"] = nullptr;
   if (calibration.pose_errors) {
     const CorrelatedPoseErrors& errors = *calibration.pose_errors;

@@ -3,13 +3,11 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <sstream>
-#include <string_view>
-#include <utility>
 #include <vector>
 
+#include "calib/report/xml_text.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
 
@@ -31,17 +29,6 @@ std::string without_camera(std::string text, const std::string& path, const std:
                       "found one of the comments \"" + first + "\" and \"" + last + "\", expected both");
   const std::size_t line = text.rfind('\n', begin), after = end + last.size();
   return text.erase(line == std::string::npos ? 0 : line, after - (line == std::string::npos ? 0 : line));
-}
-
-/// Throws unless the text is XML whose root has this name.
-void parse(const std::string& text, const std::string& path, const std::string& root,
-           tinyxml2::XMLDocument& document) {
-  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
-    throw data::InputError(path + ": is no XML: line " + std::to_string(document.ErrorLineNum()));
-  const tinyxml2::XMLElement* const element = document.RootElement();
-  if (element == nullptr || root != element->Name())
-    throw data::InputError(path + ": found <" + (element == nullptr ? "" : element->Name()) +
-                           ">, expected <" + root + ">");
 }
 
 std::string name_of(const tinyxml2::XMLElement& element) {
@@ -98,47 +85,13 @@ void expect_free(const std::vector<std::string>& names, const std::string& path,
             "\", which flash-calib did not write, expected none: give it another with --child-frame");
 }
 
-/// The same text with blanks in place of comments, of CDATA and of what stands between <? and ?>.
-std::string without_remarks(std::string text) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kKinds = {
-      {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}}};
-  for (std::size_t k = 0; k < text.size(); ++k)
-    for (const auto& [begin, end] : kKinds) {
-      if (text.compare(k, begin.size(), begin) != 0) continue;
-      const std::size_t last = text.find(end, k + begin.size());
-      const std::size_t after = last == std::string::npos ? text.size() : last + end.size();
-      std::fill(text.begin() + static_cast<std::ptrdiff_t>(k),
-                text.begin() + static_cast<std::ptrdiff_t>(after), ' ');
-    }
-  return text;
-}
-
-std::size_t end_of_tag(const std::string& text, std::size_t begin) {
-  char quote = 0;
-  for (std::size_t k = begin; k < text.size(); ++k) {
-    if (quote != 0) {
-      if (text[k] == quote) quote = 0;
-    } else if (text[k] == '"' || text[k] == '\'') {
-      quote = text[k];
-    } else if (text[k] == '>') {
-      return k;
-    }
-  }
-  return std::string::npos;
-}
-
 /// Behind the opening tag of the n-th element of a kind, in the order of the document. npos: its tag closes
 /// itself, or there is none.
 std::size_t behind_tag(const std::string& document, const std::string& kind, std::size_t n) {
-  const std::string text = without_remarks(document), tag = "<" + kind;
-  for (std::size_t k = text.find(tag); k != std::string::npos; k = text.find(tag, k + 1)) {
-    const char next = k + tag.size() < text.size() ? text[k + tag.size()] : '\0';
-    if (std::string_view(">/ \t\n\r").find(next) == std::string_view::npos) continue;
-    if (n-- > 0) continue;
-    const std::size_t end = end_of_tag(text, k);
-    return end == std::string::npos || text[end - 1] == '/' ? std::string::npos : end + 1;
-  }
-  return std::string::npos;
+  const std::string text = without_remarks(document);
+  const std::size_t begin = tag_of(text, kind, n);
+  const std::size_t end = begin == std::string::npos ? begin : end_of_tag(text, begin);
+  return end == std::string::npos || text[end - 1] == '/' ? std::string::npos : end + 1;
 }
 
 /// The link that carries each link of a robot.
@@ -183,7 +136,7 @@ std::string parsed_without_camera(const std::string& text, const std::string& pa
                                   const std::string& camera, tinyxml2::XMLDocument& document) {
   expect_name_in_comment(camera);
   std::string robot = without_camera(text, path, camera);
-  parse(robot, path, root, document);
+  parse_xml(robot, path, root, document);
   return robot;
 }
 

@@ -46,8 +46,10 @@ Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eige
                 .pivots = {Eigen::Vector3d::Zero()},
                 .poses = {},
                 .views = {}};
-  if (!observations.empty() && observations.front().joint_motions.cols() > 0)
-    bundle.joint_zeros = {Eigen::VectorXd::Zero(observations.front().joint_motions.cols())};
+  if (!observations.empty() && observations.front().joint_motions.cols() > 0) {
+    bundle.joint_error_sd = {joint_error_sd(observations.front())};
+    bundle.joint_errors = {Eigen::VectorXd::Zero(bundle.joint_error_sd.front().size())};
+  }
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
     RobotPose pose;
@@ -91,10 +93,15 @@ Eigen::Isometry3d predicted_pose(const Bundle& bundle, const BundleView& view, b
   return chain_of(bundle, view, corrected).target_in_camera();
 }
 
+Eigen::VectorXd joint_error_sd(const Observation& observation) {
+  if (observation.joint_sd.size() > 0) return observation.joint_sd;
+  return Eigen::VectorXd::Constant(observation.joint_motions.cols(), kUsualJointZero);
+}
+
 Eigen::Isometry3d usual_correction(const Bundle& bundle, const RobotPose& pose) {
-  if (bundle.joint_zeros.empty() || pose.joint_motions.cols() == 0) return Eigen::Isometry3d::Identity();
+  if (bundle.joint_errors.empty() || pose.joint_motions.cols() == 0) return Eigen::Isometry3d::Identity();
   return moved(Eigen::Isometry3d::Identity(),
-               pose.joint_motions * bundle.joint_zeros[static_cast<std::size_t>(pose.arm)]);
+               pose.joint_motions * bundle.joint_errors[static_cast<std::size_t>(pose.arm)]);
 }
 
 Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected) {

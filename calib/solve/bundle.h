@@ -8,6 +8,7 @@
 #include "calib/dataset/edge_offset.h"
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target_shape.h"
+#include "calib/geometry/arm_model.h"
 #include "calib/geometry/chain.h"
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose.h"
@@ -23,7 +24,7 @@ struct RobotPose {
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d correction = Eigen::Isometry3d::Identity();  ///< true pose = T_base_gripper * correction
   Vector6d velocity = Vector6d::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; for the time offset
-  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< where joints are known (serial_chain.h)
+  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< as in Observation
 };
 
 /// One target in one image.
@@ -38,19 +39,15 @@ struct BundleView {
                                   ///< none
 };
 
-/// Of the zeros of joints of arms in use [rad].
-constexpr double kUsualJointZero = 0.1 * M_PI / 180;
-
 /// What is known before a picture is taken: normal distributions about what is stated.
 struct Priors {
   std::vector<double> scale_sd = {};  ///< of each target's scale; empty: nothing
   /// Of each target: full standard deviation of the scale that the pictures tell, over that of noise alone.
   /// The prior weighs as much more against residuals that are taken for noise. Empty: 1.
   std::vector<double> caution = {};
-  std::vector<LensPrior> lenses = {};      ///< of each camera; empty: nothing
-  std::vector<double> warp_sd = {};        ///< of each number of each target's warp [m]; empty: flat
-  double joint_zero_sd = kUsualJointZero;  ///< of each joint's zero [rad]
-  std::optional<AlongPrior> along = {};    ///< of the first camera or target
+  std::vector<LensPrior> lenses = {};    ///< of each camera; empty: nothing
+  std::vector<double> warp_sd = {};      ///< of each number of each target's warp [m]; empty: flat
+  std::optional<AlongPrior> along = {};  ///< of the first camera or target
 };
 
 /// Of a target's scale; infinity where nothing is known.
@@ -75,11 +72,12 @@ struct Bundle {
   std::vector<Warp> warps = {};            ///< of each target, see target_bows(); empty: flat
   std::vector<double> edge_offsets = {};   ///< of each camera [px], see EdgeOffset; empty: 0
   std::vector<double> time_offsets;        ///< tau of each arm [s]
-  std::vector<Eigen::VectorXd> joint_zeros =
-      {};                                 ///< of each arm: joints are that much farther [rad]; empty: 0
-  std::vector<double> depth_scales = {};  ///< of each camera: depth over distance; empty: 1
-  std::vector<Eigen::Vector3d> pivots;    ///< of each arm, in its gripper: where errors of rotation and of
-                                          ///< translation are independent [m]
+  /// Of each arm: joints are that much farther [rad], then links so much longer [m]; empty: 0.
+  std::vector<Eigen::VectorXd> joint_errors = {};
+  std::vector<Eigen::VectorXd> joint_error_sd = {};  ///< beforehand, of each of them
+  std::vector<double> depth_scales = {};             ///< of each camera: depth over distance; empty: 1
+  std::vector<Eigen::Vector3d> pivots;  ///< of each arm, in its gripper: where errors of rotation and of
+                                        ///< translation are independent [m]
   std::vector<RobotPose> poses;
   std::vector<BundleView> views;
   Priors priors = {};
@@ -124,8 +122,11 @@ inline double depth_scale(const Bundle& bundle, std::size_t camera) {
   return bundle.depth_scales.empty() ? 1 : bundle.depth_scales[camera];
 }
 
-/// What a pose needs for the zeros of its arm's joints, to first order: the mean that its correction scatters
-/// about.
+/// Deviations beforehand of the errors of an observation's joints.
+Eigen::VectorXd joint_error_sd(const Observation& observation);
+
+/// What a pose needs for the errors of its arm's joints, to first order: the mean that its correction
+/// scatters about.
 Eigen::Isometry3d usual_correction(const Bundle& bundle, const RobotPose& pose);
 
 /// The closed chain through one view, with the correction of the robot's pose or without.

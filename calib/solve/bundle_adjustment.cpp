@@ -178,21 +178,21 @@ class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1, 1> {
   double weight_;
 };
 
-/// Blocks: correction, zeros of the joints where there are any.
+/// Blocks: correction, errors of the joints where they are unknowns.
 class CorrectionPrior final : public ceres::CostFunction {
  public:
   CorrectionPrior(double translation, double rotation, Eigen::Vector3d pivot, const RobotPose& pose,
-                  bool zeros)
+                  bool errors)
       : translation_(1 / translation), rotation_(1 / rotation), pivot_(std::move(pivot)), pose_(pose) {
     set_num_residuals(6);
     mutable_parameter_block_sizes()->push_back(7);
-    if (zeros) mutable_parameter_block_sizes()->push_back(static_cast<int>(pose.joint_motions.cols()));
+    if (errors) mutable_parameter_block_sizes()->push_back(static_cast<int>(pose.joint_motions.cols()));
   }
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    const bool zeros = parameter_block_sizes().size() > 1;
+    const bool errors = parameter_block_sizes().size() > 1;
     Eigen::Isometry3d usual = Eigen::Isometry3d::Identity();
-    if (zeros)
+    if (errors)
       usual = moved(
           usual, pose_.joint_motions * Eigen::Map<const Eigen::VectorXd>(x[1], pose_.joint_motions.cols()));
     const CorrectionError error = correction_error(pose_of(x[0]), usual, pivot_, pose_.joint_motions);
@@ -204,9 +204,9 @@ class CorrectionPrior final : public ceres::CostFunction {
     Eigen::Map<Vector6d>(residual, 6) = weighted(error.value);
     if (!jacobians) return true;
     set_pose_jacobian(jacobians[0], weighted(error.by_correction));
-    if (zeros && jacobians[1])
+    if (errors && jacobians[1])
       Eigen::Map<Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>>(
-          jacobians[1], 6, pose_.joint_motions.cols()) = weighted(error.by_zeros);
+          jacobians[1], 6, pose_.joint_motions.cols()) = weighted(error.by_errors);
     return true;
   }
 
@@ -236,12 +236,12 @@ struct Blocks {
   std::vector<PoseBlock> cameras, bases, targets, corrections;
   std::vector<IntrinsicsVector> intrinsics;
   std::vector<Warp> warps;
-  std::vector<Eigen::VectorXd> joint_zeros;
+  std::vector<Eigen::VectorXd> joint_errors;
   std::vector<double> scales, edge_offsets, time_offsets, depth_scales;
 
   explicit Blocks(const Bundle& bundle)
       : warps(bundle.warps),
-        joint_zeros(bundle.joint_zeros),
+        joint_errors(bundle.joint_errors),
         scales(bundle.scales),
         edge_offsets(bundle.edge_offsets),
         time_offsets(bundle.time_offsets),
@@ -267,7 +267,7 @@ struct Blocks {
     bundle.scales = scales;
     bundle.warps = warps;
     bundle.edge_offsets = edge_offsets;
-    bundle.joint_zeros = joint_zeros;
+    bundle.joint_errors = joint_errors;
     bundle.time_offsets = time_offsets;
     bundle.depth_scales = depth_scales;
   }
@@ -314,7 +314,7 @@ void order_shared(const ceres::Problem& problem, Blocks& blocks, ceres::Paramete
     for (PoseBlock& block : *list) take(block.data());
   for (IntrinsicsVector& block : blocks.intrinsics) take(block.data());
   for (Warp& block : blocks.warps) take(block.data());
-  for (Eigen::VectorXd& block : blocks.joint_zeros) take(block.data());
+  for (Eigen::VectorXd& block : blocks.joint_errors) take(block.data());
   for (auto* list : {&blocks.scales, &blocks.edge_offsets, &blocks.time_offsets, &blocks.depth_scales})
     for (double& block : *list) take(&block);
 }
@@ -331,12 +331,12 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     if (!problem.HasParameterBlock(correction)) continue;
     if (unknowns.corrections) {
       const auto arm = static_cast<std::size_t>(bundle.poses[i].arm);
-      const bool zeros =
-          unknowns.joint_zeros && !blocks.joint_zeros.empty() && blocks.joint_zeros[arm].size() > 0;
+      const bool errors =
+          unknowns.joint_errors && !blocks.joint_errors.empty() && blocks.joint_errors[arm].size() > 0;
       auto* const prior = new CorrectionPrior(noise.translation[arm], noise.rotation[arm], bundle.pivots[arm],
-                                              bundle.poses[i], zeros);
-      if (zeros)
-        problem.AddResidualBlock(prior, nullptr, correction, blocks.joint_zeros[arm].data());
+                                              bundle.poses[i], errors);
+      if (errors)
+        problem.AddResidualBlock(prior, nullptr, correction, blocks.joint_errors[arm].data());
       else
         problem.AddResidualBlock(prior, nullptr, correction);
       order.AddElementToGroup(correction, 0);
@@ -381,11 +381,10 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     else
       problem.AddResidualBlock(new EdgePrior, nullptr, offset);
   }
-  for (Eigen::VectorXd& zeros : blocks.joint_zeros)
-    if (problem.HasParameterBlock(zeros.data()))
-      problem.AddResidualBlock(
-          new JointZeroPrior(static_cast<int>(zeros.size()), bundle.priors.joint_zero_sd), nullptr,
-          zeros.data());
+  for (std::size_t arm = 0; arm < blocks.joint_errors.size(); ++arm)
+    if (problem.HasParameterBlock(blocks.joint_errors[arm].data()))
+      problem.AddResidualBlock(new JointErrorPrior(bundle.joint_error_sd[arm]), nullptr,
+                               blocks.joint_errors[arm].data());
   if (const std::optional<AlongPrior>& along = bundle.priors.along) {
     double* const block = (along->target ? blocks.targets : blocks.cameras).front().data();
     if (problem.HasParameterBlock(block)) problem.AddResidualBlock(new AlongCost(*along), nullptr, block);

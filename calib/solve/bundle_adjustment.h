@@ -20,8 +20,8 @@ struct Unknowns {
   bool scales = false;        ///< of targets, held by Priors::scale_sd
   bool warps = false;         ///< of targets, held by Priors::warp_sd
   bool edge_offsets = false;  ///< of cameras that see corners of edges, held by kUsualEdgeOffset
-  bool joint_zeros =
-      false;  ///< of arms whose joints are known, held by Priors::joint_zero_sd; with corrections
+  bool joint_errors =
+      false;  ///< of arms whose joints are known, held by Bundle::joint_error_sd; with corrections
   bool time_offsets = false;
   bool depth_scales = true;  ///< of cameras with depth: it tells shape and tilt, not how long a metre is
 };
@@ -41,7 +41,7 @@ struct BundleSummary {
 
 /// Minimises the sum over all corners of rho(|pixel - project(q)|^2 / corner^2) and, with corrections D, the
 /// prior |dt|^2 / translation^2 + |dtheta|^2 / rotation^2 of each, dt being the motion of the arm's pivot,
-/// from what the zeros of its joints make of it. Levenberg-Marquardt on the manifold; the corrections are
+/// from what the errors of its joints make of it. Levenberg-Marquardt on the manifold; the corrections are
 /// eliminated first.
 BundleSummary solve_bundle(Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings = {});
 

@@ -14,10 +14,10 @@ CorrectionError correction_error(const Eigen::Isometry3d& D, const Eigen::Isomet
   error.by_correction.topLeftCorner<3, 3>() = D.linear();
   error.by_correction.topRightCorner<3, 3>() = -D.linear() * skew(p);
   error.by_correction.bottomRightCorner<3, 3>() = inverse;
-  error.by_zeros.resize(6, J.cols());
+  error.by_errors.resize(6, J.cols());
   if (J.cols() == 0) return error;
-  error.by_zeros.topRows<3>() = -J.topRows<3>() + E.linear() * skew(p) * J.bottomRows<3>();
-  error.by_zeros.bottomRows<3>() = -inverse * between.transpose() * J.bottomRows<3>();
+  error.by_errors.topRows<3>() = -J.topRows<3>() + E.linear() * skew(p) * J.bottomRows<3>();
+  error.by_errors.bottomRows<3>() = -inverse * between.transpose() * J.bottomRows<3>();
   return error;
 }
 

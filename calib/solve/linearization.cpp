@@ -75,17 +75,17 @@ Eigen::MatrixXd depth_gram(const Bundle& bundle, const BundleView& view, const U
   return gram;
 }
 
-/// The prior of a correction, linearised: its rotation and its translation. zeros: column of the first zero
-/// of its joints among all, or none.
+/// The prior of a correction, linearised: its rotation and its translation. errors: column of the first
+/// error of its joints among all, or none.
 std::pair<Eigen::MatrixXd, Eigen::MatrixXd> prior_grams(const Bundle& bundle, const RobotPose& pose,
                                                         Eigen::Index width,
-                                                        std::optional<Eigen::Index> zeros) {
+                                                        std::optional<Eigen::Index> errors) {
   const Eigen::Vector3d& pivot = bundle.pivots[static_cast<std::size_t>(pose.arm)];
   const CorrectionError error =
       correction_error(pose.correction, usual_correction(bundle, pose), pivot, pose.joint_motions);
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, width);
   rows.leftCols<6>() = error.by_correction;
-  if (zeros) rows.middleCols(*zeros, error.by_zeros.cols()) = error.by_zeros;
+  if (errors) rows.middleCols(*errors, error.by_errors.cols()) = error.by_errors;
   rows.col(width - 1) = error.value;
   const Eigen::MatrixXd translation = rows.topRows<3>(), rotation = rows.bottomRows<3>();
   return {rotation.transpose() * rotation, translation.transpose() * translation};
@@ -121,15 +121,16 @@ Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns)
     row[columns.count] = edge_offset(bundle, camera) / kUsualEdgeOffset;
     gram += row * row.transpose();
   }
-  for (std::size_t arm = 0; arm < columns.joint_zeros.size(); ++arm) {
-    if (columns.joint_zeros[arm] < 0) continue;
-    const double weight = std::pow(bundle.priors.joint_zero_sd, -2);
-    const Eigen::VectorXd& zeros = bundle.joint_zeros[arm];
-    const Eigen::Index first = columns.joint_zeros[arm], count = zeros.size();
-    gram.diagonal().segment(first, count).array() += weight;
-    gram.col(columns.count).segment(first, count) += weight * zeros;
-    gram.row(columns.count).segment(first, count) += weight * zeros.transpose();
-    gram(columns.count, columns.count) += weight * zeros.squaredNorm();
+  for (std::size_t arm = 0; arm < columns.joint_errors.size(); ++arm) {
+    if (columns.joint_errors[arm] < 0) continue;
+    const Eigen::VectorXd& errors = bundle.joint_errors[arm];
+    const Eigen::VectorXd weights = bundle.joint_error_sd[arm].cwiseAbs2().cwiseInverse(),
+                          weighted = weights.cwiseProduct(errors);
+    const Eigen::Index first = columns.joint_errors[arm], count = errors.size();
+    gram.diagonal().segment(first, count) += weights;
+    gram.col(columns.count).segment(first, count) += weighted;
+    gram.row(columns.count).segment(first, count) += weighted.transpose();
+    gram(columns.count, columns.count) += weighted.dot(errors);
   }
   if (const std::optional<AlongPrior>& along = bundle.priors.along) {
     const AlongResidual residual =
@@ -173,11 +174,11 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
   columns.edge_offsets.assign(bundle.cameras.size(), -1);
   for (std::size_t camera = 0; unknowns.edge_offsets && camera < bundle.cameras.size(); ++camera)
     if (sees_edges(bundle, camera)) columns.edge_offsets[camera] = columns.count++;
-  columns.joint_zeros.assign(bundle.joint_zeros.size(), -1);
-  for (std::size_t arm = 0; unknowns.joint_zeros && arm < bundle.joint_zeros.size(); ++arm) {
-    if (bundle.joint_zeros[arm].size() == 0) continue;
-    columns.joint_zeros[arm] = columns.count;
-    columns.count += static_cast<int>(bundle.joint_zeros[arm].size());
+  columns.joint_errors.assign(bundle.joint_errors.size(), -1);
+  for (std::size_t arm = 0; unknowns.joint_errors && arm < bundle.joint_errors.size(); ++arm) {
+    if (bundle.joint_errors[arm].size() == 0) continue;
+    columns.joint_errors[arm] = columns.count;
+    columns.count += static_cast<int>(bundle.joint_errors[arm].size());
   }
   take(columns.time_offsets, bundle.bases.size(), unknowns.time_offsets ? 1 : 0);
   columns.depth_scales.assign(bundle.cameras.size(), -1);
@@ -206,9 +207,9 @@ void move_shared(Bundle& bundle, const SharedColumns& columns, const Eigen::Vect
     if (columns.warps[i] >= 0) bundle.warps[i] += step.segment<kWarp>(columns.warps[i]);
   bundle.edge_offsets.resize(bundle.cameras.size(), 0);
   move_numbers(bundle.edge_offsets, columns.edge_offsets);
-  for (std::size_t arm = 0; arm < bundle.joint_zeros.size(); ++arm)
-    if (columns.joint_zeros[arm] >= 0)
-      bundle.joint_zeros[arm] += step.segment(columns.joint_zeros[arm], bundle.joint_zeros[arm].size());
+  for (std::size_t arm = 0; arm < bundle.joint_errors.size(); ++arm)
+    if (columns.joint_errors[arm] >= 0)
+      bundle.joint_errors[arm] += step.segment(columns.joint_errors[arm], bundle.joint_errors[arm].size());
   move_numbers(bundle.time_offsets, columns.time_offsets);
   bundle.depth_scales.resize(bundle.cameras.size(), 1);
   move_numbers(bundle.depth_scales, columns.depth_scales);
@@ -296,10 +297,10 @@ LinearModel linearize(const Bundle& bundle, const NoiseLevels& noise, const Bund
   for (int i = 0; i < model.groups; ++i) {
     // A pose that nothing saw still needs its prior to be determined; it then tells nothing of the noise.
     const RobotPose& pose = bundle.poses[static_cast<std::size_t>(i)];
-    std::optional<Eigen::Index> zeros;
-    if (!columns.joint_zeros.empty() && columns.joint_zeros[static_cast<std::size_t>(pose.arm)] >= 0)
-      zeros = model.own + columns.joint_zeros[static_cast<std::size_t>(pose.arm)];
-    auto [rotation, translation] = prior_grams(bundle, pose, model.own + model.shared + 1, zeros);
+    std::optional<Eigen::Index> errors;
+    if (!columns.joint_errors.empty() && columns.joint_errors[static_cast<std::size_t>(pose.arm)] >= 0)
+      errors = model.own + columns.joint_errors[static_cast<std::size_t>(pose.arm)];
+    auto [rotation, translation] = prior_grams(bundle, pose, model.own + model.shared + 1, errors);
     const double count = 3;
     model.blocks.push_back({i, 2 * cameras + pose.arm, count, std::move(rotation)});
     model.blocks.push_back({i, 2 * cameras + arms + pose.arm, count, std::move(translation)});

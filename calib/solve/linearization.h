@@ -14,7 +14,7 @@ struct SharedColumns {
   std::vector<int> scales, time_offsets, depth_scales;
   std::vector<int> warps;         ///< first of kWarp
   std::vector<int> edge_offsets;  ///< of cameras that see edges
-  std::vector<int> joint_zeros;   ///< first of as many as Bundle::joint_zeros has
+  std::vector<int> joint_errors;  ///< first of as many as Bundle::joint_errors has
   int intrinsics_count = 0;       ///< of each camera
   int count = 0;
 };

@@ -9,24 +9,24 @@
 
 namespace flash::calib {
 
-/// What is known of the zeros of joints beforehand.
-class JointZeroPrior final : public ceres::CostFunction {
+/// What is known of the errors of an arm's joints beforehand.
+class JointErrorPrior final : public ceres::CostFunction {
  public:
-  JointZeroPrior(int joints, double sd) : weight_(1 / sd) {
-    set_num_residuals(joints);
-    mutable_parameter_block_sizes()->push_back(joints);
+  explicit JointErrorPrior(const Eigen::VectorXd& sd) : weights_(sd.cwiseInverse()) {
+    set_num_residuals(static_cast<int>(sd.size()));
+    mutable_parameter_block_sizes()->push_back(num_residuals());
   }
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    const int joints = num_residuals();
-    Eigen::Map<Eigen::VectorXd>(residual, joints) = weight_ * Eigen::Map<const Eigen::VectorXd>(x[0], joints);
+    const Eigen::Index count = weights_.size();
+    Eigen::Map<Eigen::VectorXd>(residual, count) =
+        weights_.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(x[0], count));
     if (jacobians && jacobians[0])
-      Eigen::Map<Eigen::MatrixXd>(jacobians[0], joints, joints) =
-          weight_ * Eigen::MatrixXd::Identity(joints, joints);
+      Eigen::Map<Eigen::MatrixXd>(jacobians[0], count, count) = Eigen::MatrixXd(weights_.asDiagonal());
     return true;
   }
 
  private:
-  double weight_;
+  Eigen::VectorXd weights_;
 };
 
 /// What is known of a target's size beforehand.

@@ -288,7 +288,7 @@ PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& 
   model.arms.resize(refined.bundle.bases.size());
   model.poses.resize(model.arms.size());
   model.covariance.resize(model.arms.size());
-  if (settings.unknowns.joint_zeros) return model;
+  if (settings.unknowns.joint_errors) return model;
   for (std::size_t arm = 0; arm < model.arms.size(); ++arm) {
     model.poses[arm] = poses_of(all, refined.bundle, arm);
     if (model.poses[arm].size() < kFewestPosesOfArm) continue;

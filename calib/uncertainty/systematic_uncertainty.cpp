@@ -13,7 +13,7 @@ SystematicUncertainty systematic_uncertainty(const Refinement& refined, const Bu
                                              const PoseErrorModel& model) {
   SystematicUncertainty result{refined.covariance, model.arms, {}};
   result.caution.assign(refined.bundle.targets.size(), 1);
-  if (settings.unknowns.joint_zeros) return result;  // which the covariance holds
+  if (settings.unknowns.joint_errors) return result;  // which the covariance holds
   const std::vector<PoseInformation> all = pose_informations(refined, settings);
   const Bundle& bundle = refined.bundle;
   const SharedColumns columns = shared_columns(bundle, settings.unknowns);

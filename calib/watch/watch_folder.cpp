@@ -173,6 +173,7 @@ class Follower {
       for (CornerReading& reading : detections.back().readings) {
         reading.observation.T_base_gripper = frame.T_base_gripper;
         reading.observation.joint_motions = frame.joint_motions;
+        reading.observation.joint_sd = frame.joint_sd;
       }
     }
     drop_misfits(settings_.detect, detections);

@@ -1,0 +1,22 @@
+#pragma once
+#include <optional>
+
+#include "calib/solve/bundle_adjustment.h"
+
+namespace flash::calib {
+
+/// By how much an arm differs from its description (error_motions()): its joints were farther than it said,
+/// its links longer, beside their priors.
+struct JointErrors {
+  Eigen::VectorXd estimate, sd, prior_sd;  ///< [rad], then [m]
+
+  Eigen::Vector2d interval(Eigen::Index i) const;  ///< of 95 %
+  /// The data at least halve the deviation; else it is as good as the prior.
+  bool told(Eigen::Index i) const;
+};
+
+/// covariance: of all shared unknowns. None where no joints are known.
+std::optional<JointErrors> joint_errors(const Bundle& bundle, const Unknowns& unknowns,
+                                        const Eigen::MatrixXd& covariance);
+
+}  // namespace flash::calib
