@@ -137,8 +137,9 @@ void print_lens(const calib::Calibration& c) {
 
 /// "x", or the three numbers.
 std::string direction_name(const Eigen::Vector3d& direction) {
+  constexpr double kAlong = 0.9999;
   for (Eigen::Index i = 0; i < 3; ++i)
-    if (direction == Eigen::Vector3d::Unit(i)) return std::string(1, "xyz"[i]);
+    if (direction[i] > kAlong) return std::string(1, "xyz"[i]);
   return "(" + fixed(direction.x(), 2) + ", " + fixed(direction.y(), 2) + ", " + fixed(direction.z(), 2) +
          ")";
 }
@@ -154,7 +155,7 @@ void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsi
                 unit, fixed(interval[0], 3).c_str(), fixed(interval[1], 3).c_str(),
                 errors->told(i) ? "" : " not told");
   };
-  std::printf("joints are farther than they say by (95 %% intervals; not told: known as before at best):\n");
+  std::printf("joints are farther than they say by, with intervals of 95 %%:\n");
   Eigen::Index next = 0;
   for (const std::string& name : calib::moving_joints(arm.chain)) line(name, next++, 180 / M_PI, "deg");
   if (arm.lengths.empty()) {
@@ -163,7 +164,7 @@ void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsi
         "hold (--link-lengths solves for them)\n");
     return;
   }
-  std::printf("origins of joints are farther than the URDF says by:\n");
+  std::printf("origins of joints are farther than the URDF says by, likewise:\n");
   for (const calib::LinkLength& length : arm.lengths)
     line(arm.chain.joints[length.joint].name + " along " + direction_name(length.direction), next++, 1e3,
          "mm");
