@@ -80,8 +80,7 @@ std::string with_joint_origins(const std::string& text, const std::string& path,
                               "found it " + std::to_string(places.size()) +
                                   " times, expected once, as in the robot of the calibration");
     const Eigen::Isometry3d present = urdf_origin(*places.front().joint, path);
-    if (same(present, origin.corrected)) continue;
-    if (!same(present, origin.described)) {
+    if (!same(present, origin.corrected) && !same(present, origin.described)) {
       const Eigen::Isometry3d& T = origin.described;
       throw data::input_error(path, field,
                               "found origin " + three(present.translation()) + ", rpy " +

@@ -97,6 +97,8 @@ def recording(tool, folder):
     program.must(tool, folder, "eye-in-hand", "chessboard:9x6:0.025", 25, "640x480", "0.003", "0.02", 7)
     q = []
     for line in (folder / "poses.tum").read_text().splitlines():
+        if line.startswith("#"):
+            continue
         stamp, *pose = numbers(line)
         q.append((int(stamp), joints_of(program.rotation_of(pose[3:]), pose[:3])))
     with open(folder / "joints.csv", "w", newline="") as file:
