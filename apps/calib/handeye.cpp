@@ -157,7 +157,11 @@ void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsi
   };
   std::printf("joints are farther than they say by, with intervals of 95 %%:\n");
   Eigen::Index next = 0;
-  for (const std::string& name : calib::moving_joints(arm.chain)) line(name, next++, 180 / M_PI, "deg");
+  for (const calib::Joint& joint : arm.chain.joints) {
+    if (joint.kind == calib::Joint::Kind::fixed) continue;
+    const bool turns = joint.kind == calib::Joint::Kind::revolute;
+    line(joint.name, next++, turns ? 180 / M_PI : 1e3, turns ? "deg" : "mm");
+  }
   if (arm.lengths.empty()) {
     std::printf(
         "  the links were taken as the URDF has them: where they may be off by 0.3 mm, the deviations do not "

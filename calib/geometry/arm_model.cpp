@@ -52,11 +52,13 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> error_motions(const ArmModel& arm, cons
 }
 
 Eigen::VectorXd prior_deviations(const ArmModel& arm) {
-  const auto zeros = static_cast<Eigen::Index>(moving_joints(arm.chain).size()),
-             lengths = static_cast<Eigen::Index>(arm.lengths.size());
-  Eigen::VectorXd sd(zeros + lengths);
-  sd << Eigen::VectorXd::Constant(zeros, kUsualJointZero), Eigen::VectorXd::Constant(lengths, arm.length_sd);
-  return sd;
+  constexpr double kUsualRailZero = 1e-3;  // [m]
+  std::vector<double> sd;
+  for (const Joint& joint : arm.chain.joints)
+    if (joint.kind != Joint::Kind::fixed)
+      sd.push_back(joint.kind == Joint::Kind::revolute ? kUsualJointZero : kUsualRailZero);
+  sd.insert(sd.end(), arm.lengths.size(), arm.length_sd);
+  return Eigen::VectorXd::Map(sd.data(), static_cast<Eigen::Index>(sd.size()));
 }
 
 SerialChain corrected_chain(const ArmModel& arm, const Eigen::VectorXd& errors) {

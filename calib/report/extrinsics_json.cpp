@@ -115,14 +115,16 @@ Json along_json(const PlaceAlong& along, const HandEyePoses& poses) {
   return json;
 }
 
-/// Of `count` errors from the `first` on, in degrees or millimetres.
-Json errors_json(const JointErrors& errors, Eigen::Index first, Eigen::Index count, double scale,
+/// Of the errors from the `first` on, each times its scale.
+Json errors_json(const JointErrors& errors, Eigen::Index first, const Eigen::VectorXd& scale,
                  const std::string& unit) {
-  Json json = {{"estimate_" + unit, list(Eigen::VectorXd(scale * errors.estimate.segment(first, count)))},
-               {"sd_" + unit, list(Eigen::VectorXd(scale * errors.sd.segment(first, count)))}};
+  const Eigen::Index count = scale.size();
+  Json json = {
+      {"estimate_" + unit, list(Eigen::VectorXd(scale.cwiseProduct(errors.estimate.segment(first, count))))},
+      {"sd_" + unit, list(Eigen::VectorXd(scale.cwiseProduct(errors.sd.segment(first, count))))}};
   Json intervals = Json::array(), told = Json::array();
   for (Eigen::Index i = first; i < first + count; ++i) {
-    intervals.push_back(list(Eigen::Vector2d(scale * errors.interval(i))));
+    intervals.push_back(list(Eigen::Vector2d(scale[i - first] * errors.interval(i))));
     told.push_back(errors.told(i));
   }
   json["interval_" + unit] = std::move(intervals);
@@ -142,8 +144,16 @@ void add_joint_errors(const Calibration& calibration, const Extrinsics& extrinsi
   if (!errors || !extrinsics.inputs.arm) return;
   const ArmModel& arm = *extrinsics.inputs.arm;
   const auto lengths = static_cast<Eigen::Index>(arm.lengths.size()), zeros = errors->sd.size() - lengths;
-  json["joint_zeros"] = {{"joints", moving_joints(arm.chain)}};
-  json["joint_zeros"].update(errors_json(*errors, 0, zeros, kDegrees, "deg"));
+  Eigen::VectorXd scale(zeros);
+  Json units = Json::array();
+  for (const Joint& joint : arm.chain.joints) {
+    if (joint.kind == Joint::Kind::fixed) continue;
+    const bool turns = joint.kind == Joint::Kind::revolute;
+    scale[static_cast<Eigen::Index>(units.size())] = turns ? kDegrees : 1e3;
+    units.push_back(turns ? "deg" : "mm");
+  }
+  json["joint_zeros"] = {{"joints", moving_joints(arm.chain)}, {"units", units}};
+  json["joint_zeros"].update(errors_json(*errors, 0, scale, "deg"));
   json["joint_origins"] = Json::array();
   for (const JointOrigin& origin : extrinsics.joint_origins)
     json["joint_origins"].push_back({{"joint", origin.joint},
@@ -157,7 +167,7 @@ void add_joint_errors(const Calibration& calibration, const Extrinsics& extrinsi
   }
   json["link_lengths"] = {
       {"prior_sd_mm", 1e3 * arm.length_sd}, {"joints", joints}, {"directions", directions}};
-  json["link_lengths"].update(errors_json(*errors, zeros, lengths, 1e3, "mm"));
+  json["link_lengths"].update(errors_json(*errors, zeros, Eigen::VectorXd::Constant(lengths, 1e3), "mm"));
 }
 
 Json depth_json(const DepthUse& depth) {

@@ -74,7 +74,9 @@ def forward(text, q):
 
 def as_answered(answer, q):
     """The same of the described arm at q and the zeros of the answer, with its lengths."""
-    zeros = dict(zip(answer["joint_zeros"]["joints"], answer["joint_zeros"]["estimate_deg"], strict=True))
+    solved = answer["joint_zeros"]
+    zeros = {name: value / 1e3 if unit == "mm" else math.radians(value)
+             for name, value, unit in zip(solved["joints"], solved["estimate_deg"], solved["units"], strict=True)}
     lengths = answer["link_lengths"]
     R, t = [[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0, 0]
     for name, value in zip([*AXES, "flange"], [*q, 0]):
@@ -84,7 +86,7 @@ def as_answered(answer, q):
                 origin = plus(origin, [estimate / 1e3 * d for d in direction])
         t = plus(t, times(R, origin))
         if name in AXES:
-            at = value + math.radians(zeros[name])
+            at = value + zeros[name]
             if name.startswith("rail"):
                 t = plus(t, times(R, [at * a for a in AXES[name]]))
             else:
