@@ -17,6 +17,9 @@ PYTHON ?= /usr/bin/python3
 PYTHON_DEVICE ?= cpu
 REFERENCE ?= tests/reference
 RELEASE ?=
+ENGINE ?= $(notdir $(firstword $(shell command -v docker podman buildah)))
+CONTAINER_ARGS ?=
+VERSION = $(shell sed -n 's/^project(flash VERSION \([0-9.]*\) .*/\1/p' CMakeLists.txt)
 
 sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
@@ -25,29 +28,34 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study link-length-study use-study watch-study held-out
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
-.PHONY: cell pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
+.PHONY: tours examples container pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
-demo: configure  ## Packages, build, then the main job on depth frames it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
+demo: configure  ## Packages, build, then the main job on the recording in examples/towel_lift: $(DEMO)/tuned.json, $(DEMO)/run/report.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
-	$(sysid) synth --asset examples/assets/towel.json --mesh sheet:0.3x0.3:0.01 --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
-	$(sysid) segment $(DEMO)/recording/camera1 --trajectory $(DEMO)/recording/gripper.tum --times rate:10 --force -o $(DEMO)/segmented
+	$(sysid) segment examples/towel_lift/camera1 --trajectory examples/towel_lift/gripper.tum --times rate:10 --force -o $(DEMO)/segmented
 	$(sysid) import $(DEMO)/segmented/frames --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 \
-	  --crop-z 0.008: --offset-bound 0.005 --force -o $(DEMO)/lift
+	  --crop-z 0.008: --offset-bound 0.02 --force -o $(DEMO)/lift
 	$(sysid) grid $(DEMO)/lift --asset examples/assets/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 \
 	  --hold areal_density=0.2:measured --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
 	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \
-	  'Truth:       $(abspath $(DEMO)/recording/truth.json)'
+	  'Truth:       $(abspath examples/towel_lift/truth.json)'
 
-cell: configure-test  ## Packages, build, then recordings of a camera on a gripper and one beside it, with known truth: $(DEMO)/cell
-	cmake --build $(BUILD) -j $(JOBS) --target flash-calib rendered_dataset
-	mkdir -p $(DEMO)/cell
-	$(BUILD)/tests/rendered_dataset $(DEMO)/cell/wrist eye-in-hand charuco:7x5:0.04:0.03:DICT_5X5_100 20 640x480 0.05 0.5
-	$(BUILD)/tests/rendered_dataset $(DEMO)/cell/beside eye-to-hand charuco:7x5:0.04:0.03:DICT_5X5_100 20 640x480 0.05 0.5
+tours: build  ## Packages, build, then the commands of Start and of both tours, in order, with the seconds of each and their sum
+	$(PYTHON) tests/documents/tours.py start.md calibrate_a_cell.md identify_a_towel.md --bin $(BUILD)/bin --out $(BUILD)/tours
+
+examples: configure-test  ## Draw the recordings in examples/ anew, by the commands of their README
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid flash-calib rendered_dataset
+	$(PYTHON) tests/documents/examples_test.py --bin $(BUILD)/bin --draw $(BUILD)/tests/rendered_dataset --write
+
+# The image has the version as its tag. ENGINE is docker, podman or buildah; CONTAINER_ARGS='--build-arg CUDA=ON' is for NVIDIA devices.
+container:  ## An image of programs, Python package and examples, by docker, podman or buildah: flash:VERSION
+	@test -n "$(ENGINE)" || { echo 'make container: found neither docker, podman nor buildah' >&2; exit 2; }
+	$(ENGINE) build $(CONTAINER_ARGS) --tag flash:$(VERSION) --file Containerfile .
 
 build: configure  ## Packages, then the release build in $(BUILD)
 	cmake --build $(BUILD) -j $(JOBS)
@@ -250,10 +258,8 @@ site: packages-site configure-test  ## The documents as a site that opens offlin
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim
 	scripts/site $(PYTHON) $(BUILD)/bin
 
-pictures: packages-site configure-test  ## Draw the pictures of the tours and of reports anew, into docs/images, after make demo
-	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid rendered_dataset
-	$(PYTHON) tests/documents/tours.py calibrate_a_cell.md identify_a_towel.md --bin $(BUILD)/bin --draw $(BUILD)/tests/rendered_dataset \
-	  --demo $(DEMO) --out $(BUILD)/tours --images docs/images
+pictures: packages-site build  ## Draw the pictures of the tours and of reports anew, into docs/images
+	$(PYTHON) tests/documents/tours.py start.md calibrate_a_cell.md identify_a_towel.md --bin $(BUILD)/bin --out $(BUILD)/tours --images docs/images
 
 release: packages-site configure-test  ## Sources, wheel and site of the committed state in dist/, then the tag; RELEASE=--no-tag without
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <opencv2/imgcodecs.hpp>
 
 #include "calib/geometry/pose.h"
 #include "data/camera/depth_image.h"
@@ -33,6 +34,14 @@ data::Picture to_picture(const GreyImage& image) {
   for (std::size_t i = 0; i < picture.pixels.size(); ++i)
     picture.pixels[i] = {image.pixels[i], image.pixels[i], image.pixels[i]};
   return picture;
+}
+
+void save_picture(GreyImage image, int jpeg_quality, const fs::path& path) {
+  if (jpeg_quality == 0) return data::save_png(to_picture(image), path.string());
+  fs::create_directories(path.parent_path());
+  const cv::Mat grey(image.height, image.width, CV_8UC1, image.pixels.data());
+  if (!cv::imwrite(path.string(), grey, {cv::IMWRITE_JPEG_QUALITY, jpeg_quality}))
+    throw data::InputError(path.string() + ": cannot be written");
 }
 
 /// A camera of 60 degrees across with a little distortion.
@@ -166,7 +175,7 @@ HandEyePoses write_rendered_set(const RenderedSetSettings& settings, const std::
     const Eigen::Isometry3d T_base_gripper = scene.gripper(taken);
     const Eigen::Isometry3d C = target_in_camera(settings.setup, scene.truth, T_base_gripper);
     char name[32];
-    std::snprintf(name, sizeof name, stream ? "%.3f.png" : "%03.0f.png", stamp);
+    std::snprintf(name, sizeof name, stream ? "%.3f" : "%03.0f", stamp);
     if (!stream) {
       poses.times.push_back(i);
       poses.poses.push_back(reported(T_base_gripper));
@@ -180,10 +189,11 @@ HandEyePoses write_rendered_set(const RenderedSetSettings& settings, const std::
             target_in_camera(settings.setup, scene.truth,
                              scene.gripper(taken + settings.exposure * ((k + 0.5) / kMoments - 0.5))));
     }
-    data::save_png(to_picture(renderer.draw(exposed, random)), (fs::path(folder) / "images" / name).string());
+    save_picture(renderer.draw(exposed, random), settings.jpeg_quality,
+                 fs::path(folder) / "images" / (name + std::string(settings.jpeg_quality ? ".jpg" : ".png")));
     if (settings.depth_mm >= 0)
       data::save_depth_image(depth_picture(renderer, camera, C, settings, random),
-                             (fs::path(folder) / "depth" / name).string());
+                             (fs::path(folder) / "depth" / (name + std::string(".png"))).string());
   }
   for (int k = 0; stream && k * 0.01 < kPeriod * settings.views + 1; ++k) {
     poses.times.push_back(kStart + 0.01 * k);

@@ -24,6 +24,7 @@ struct RenderedSetSettings {
   RobotMotion motion = RobotMotion::random;
   double least_distance = 0, most_distance = 0;  ///< of the target [m]; 0: by its size
   double pixel_noise = 2;                        ///< of 255
+  int jpeg_quality = 0;                          ///< 1 to 100: pictures are grey JPEG of that quality; 0: PNG
   double depth_mm = -1;     ///< noise of a depth pixel; negative: no depth pictures. Counts are millimetres
   double depth_factor = 1;  ///< what depth says over what is true
   double exposure =

@@ -9,7 +9,7 @@ RUN = "sh"
 
 
 def documents():
-    return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(path for name in ("docs", "examples") for path in sorted((ROOT / name).rglob("*.md")))]
 
 
 def blocks(text):

@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Runs the commands of a tour, block by block, where `make cell` or `make demo` left its recording. Each prints what stands in the
-```text below it, numbers to a tenth, and ends with 0, or with the exit code that the text behind it names."""
+"""Runs the commands of pages, block by block, as a reader does who goes from page to page. Each prints what stands in the ```text
+below it, numbers to a tenth, and ends with 0, or with the exit code that the text behind it names. The seconds of each are told."""
 import argparse
 import json
 import os
 import pathlib
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -35,6 +34,7 @@ PICTURES = {
         "towel_import.png": ("demo/lift/import.svg", 698, 899, ""),
         "report.png": ("demo/run/report.html", 1180, 700, ""),
         "towel_profiles.png": ("demo/run/report.html", 1180, 480, ONLY("profile-section")),
+        "towel_place.png": ("demo/place/report.html", 1180, 620, ""),
         "towel_low.png": ("demo/low/report.html", 1180, 620, ""),
         "towel_small.png": ("demo/small/report.html", 1180, 620, ""),
         "towel_replay.png": ("demo/check/sequence.png", 0, 0, ""),
@@ -42,25 +42,11 @@ PICTURES = {
 }
 
 
-def commands_of_make(target):
-    """Lines of a target of the Makefile, its own variables in place."""
-    text = re.search(rf"^{target}:.*\n((?:\t.*\n)+)", (commands.ROOT / "Makefile").read_text(), re.MULTILINE)[1]
-    return [line.strip() for line in text.splitlines()]
-
-
-def prepare(out, draw, demo):
-    """The folder in which the commands are run: examples/ of the checkout, and demo/ as make leaves it."""
+def prepare(out):
+    """The folder in which the commands are run, with examples/ of the checkout."""
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     (out / "examples").symlink_to(commands.ROOT / "examples")
-    if demo:
-        shutil.copytree(demo, out / "demo", ignore=shutil.ignore_patterns("motions"))
-    if draw:
-        (out / "demo/cell").mkdir(parents=True)
-        for line in commands_of_make("cell"):
-            if "rendered_dataset " in line:
-                words = shlex.split(line.replace("$(DEMO)", "demo"))
-                subprocess.run([draw, *words[1:]], cwd=out, check=True, stdout=subprocess.DEVNULL)
 
 
 def same_numbers(said, found):
@@ -93,8 +79,8 @@ def missing(said, found):
             k = at + 1
 
 
-def run(page, out, path):
-    """Complaints about the page."""
+def run(page, out, path, seconds):
+    """Complaints about the page; the seconds that each block takes are added to those before."""
     found = commands.blocks((commands.ROOT / "docs" / page).read_text())
     after = [prose for _, _, prose in found[1:]] + [""]
     count = 0
@@ -102,9 +88,11 @@ def run(page, out, path):
         if language != commands.RUN:
             continue
         count += 1
-        script = "\n".join(lines)
+        script, begun = "\n".join(lines), time.monotonic()
         done = subprocess.run(["bash", "-e", "-c", script], cwd=out, text=True, errors="replace", stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT, env={**os.environ, "PATH": f"{path}:{os.environ['PATH']}"})
+        seconds.append(time.monotonic() - begun)
+        print(f"{seconds[-1]:7.1f} s  {page}: {lines[0].removesuffix(chr(92)).rstrip()}", flush=True)
         shown = k + 1 < len(found) and found[k + 1][0] == "text"
         prose = after[k] + (after[k + 1] if shown else "")
         codes = [int(code) for code in re.findall(r"exit code (?:is )?(\d)", prose)]
@@ -117,9 +105,10 @@ def run(page, out, path):
 
 
 def draw_watch(words, out, path, picture, size):
-    """The page that the words serve, once it has answered: the first eight pictures of demo/cell/wrist."""
+    """The page that the words serve, once it has answered: the first eight pictures of examples/handeye/wrist."""
     growing = out / words[-1]
-    shutil.copytree(out / "demo/cell/wrist", growing, ignore=lambda _, names: [n for n in names if n > "007.png" and n.endswith(".png")])
+    shutil.copytree(out / "examples/handeye/wrist", growing,
+                    ignore=lambda _, names: [n for n in names if n > "007.jpg" and n.endswith(".jpg")])
     with subprocess.Popen([path / words[0], *words[1:], "--port", "0"], cwd=out, stdout=subprocess.PIPE, text=True) as served:
         address = re.search(r"http://\S+/", served.stdout.readline())[0]
         state = {}
@@ -146,16 +135,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("pages", nargs="+", help="of docs/, with blocks ```sh")
     parser.add_argument("--bin", required=True, type=pathlib.Path, help="the folder of the programs")
-    parser.add_argument("--draw", help="the program rendered_dataset")
-    parser.add_argument("--demo", type=pathlib.Path, help="what make demo left")
     parser.add_argument("--out", required=True, type=pathlib.Path)
     parser.add_argument("--images", type=pathlib.Path, help="draw the pictures of the pages into this folder")
     options = parser.parse_args()
     out = options.out.resolve()
-    prepare(out, options.draw, options.demo)
-    wrong = []
+    prepare(out)
+    wrong, seconds = [], []
     for page in options.pages:
-        wrong += run(page, out, options.bin.resolve())
+        wrong += run(page, out, options.bin.resolve(), seconds)
+    print(f"{sum(seconds):7.1f} s, {sum(seconds) / 60:.1f} minutes, for {len(seconds)} blocks of commands on {os.cpu_count()} cores")
     if wrong:
         sys.exit("\n\n".join(wrong))
     for page in options.pages if options.images else []:

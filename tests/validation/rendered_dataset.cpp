@@ -5,7 +5,7 @@
 //   rendered_dataset late eye-in-hand chessboard:9x6:0.025 25 640x480 0.02 0.2 1 motion=stream
 //   time_offset=0.03
 // Names: motion (random, pan-tilt, one-axis, stream), depth_mm, depth_factor, time_offset, exposure,
-// pixel_noise, near, far.
+// pixel_noise, jpeg_quality, near, far.
 #include <cstdio>
 #include <iostream>
 #include <string>
@@ -32,6 +32,8 @@ void set(RenderedSetSettings& settings, const std::string& option) {
     settings.time_offset = std::stod(value);
   else if (name == "pixel_noise")
     settings.pixel_noise = std::stod(value);
+  else if (name == "jpeg_quality")
+    settings.jpeg_quality = std::stoi(value);
   else if (name == "near")
     settings.least_distance = std::stod(value);
   else if (name == "far")
