@@ -19,6 +19,7 @@ REFERENCE ?= tests/reference
 RELEASE ?=
 ENGINE ?= $(notdir $(firstword $(shell command -v docker podman buildah)))
 CONTAINER_ARGS ?=
+RUN_IMAGE ?= $(ENGINE) run --rm flash:$(VERSION)
 VERSION = $(shell sed -n 's/^project(flash VERSION \([0-9.]*\) .*/\1/p' CMakeLists.txt)
 
 sysid = $(BUILD)/bin/flash-sysid
@@ -28,7 +29,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study link-length-study use-study watch-study held-out
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
-.PHONY: tours examples container pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
+.PHONY: tours examples container container-test pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -56,6 +57,9 @@ examples: configure-test  ## Draw the recordings in examples/ anew, by the comma
 container:  ## An image of programs, Python package and examples, by docker, podman or buildah: flash:VERSION
 	@test -n "$(ENGINE)" || { echo 'make container: found neither docker, podman nor buildah' >&2; exit 2; }
 	$(ENGINE) build $(CONTAINER_ARGS) --tag flash:$(VERSION) --file Containerfile .
+
+container-test:  ## Say whether the image of make container runs, by docker or podman; RUN_IMAGE says another way to run a command in it
+	$(PYTHON) tests/scripts/image_test.py --run "$(RUN_IMAGE)"
 
 build: configure  ## Packages, then the release build in $(BUILD)
 	cmake --build $(BUILD) -j $(JOBS)
@@ -261,7 +265,7 @@ site: packages-site configure-test  ## The documents as a site that opens offlin
 pictures: packages-site build  ## Draw the pictures of the tours and of reports anew, into docs/images
 	$(PYTHON) tests/documents/tours.py start.md calibrate_a_cell.md identify_a_towel.md --bin $(BUILD)/bin --out $(BUILD)/tours --images docs/images
 
-release: packages-site configure-test  ## Sources, wheel and site of the committed state in dist/, then the tag; RELEASE=--no-tag without
+release: packages-site configure-test  ## Sources, wheel, site and container file of the committed state in dist/, then the tag; RELEASE=--no-tag without
 	cmake --build $(BUILD) -j $(JOBS) --target flash-calib flash-sysid flash-sim
 	scripts/release $(PYTHON) $(BUILD)/bin $(RELEASE)
 

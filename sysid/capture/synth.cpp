@@ -309,7 +309,8 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   std::mt19937_64 random(settings.seed + 1), raw_random(settings.seed + 2);
   if (settings.raw) {
     synthetic.cameras = settings.cameras;
-    for (SynthCamera& stated : synthetic.cameras) stated.base_from_camera.translation() += settings.cloud_offset;
+    for (SynthCamera& stated : synthetic.cameras)
+      stated.base_from_camera.translation() += settings.cloud_offset;
     synthetic.raw.resize(settings.cameras.size());
   }
   for (data::RecordedKeyframe& keyframe : synthetic.recording.keyframes) {

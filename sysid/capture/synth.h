@@ -53,7 +53,7 @@ struct SynthRecording {
   data::Recording recording;                       ///< keyframes without paths
   std::vector<data::Points> clouds;                ///< one a keyframe, base frame [m]
   std::vector<data::Points> contours;              ///< visible border of the sheet, one a keyframe [m]
-  std::vector<SynthCamera> cameras;                ///< of the raw images
+  std::vector<SynthCamera> cameras;                ///< of the raw images, as is stated: with cloud_offset
   std::vector<std::vector<data::DepthImage>> raw;  ///< of each camera, one a keyframe [mm]; empty: not kept
   double residual_max = 0;                         ///< of the simulated steps, |r| / |M g|
   double unconverged_share = 0;                    ///< of the simulated steps

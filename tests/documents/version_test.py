@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The version stands in CMakeLists.txt; the programs, the citation and the changelog have the same."""
+"""The version stands in CMakeLists.txt; the programs, the citation, the changelog and the image of a container have the same."""
 import argparse
 import pathlib
 import re
@@ -20,6 +20,7 @@ def main():
     options = parser.parse_args()
     version = found("CMakeLists.txt", r"^project\(flash VERSION ([0-9]+\.[0-9]+\.[0-9]+) ")
     others = {"CITATION.cff": found("CITATION.cff", r"^version: (.*)$"),
+              "Containerfile": found("Containerfile", r'image\.version="([0-9.]+)"'),
               "CHANGELOG.md": found("CHANGELOG.md", r"^## ([0-9.]+)"),
               "tests/consumer": version if found("tests/consumer/CMakeLists.txt", r"^find_package\(flash ([0-9.]+) ") ==
               version.rpartition(".")[0] else "another one",
