@@ -20,7 +20,7 @@ RELEASE ?=
 ENGINE ?= $(notdir $(firstword $(shell command -v docker podman buildah)))
 CONTAINER_ARGS ?=
 RUN_IMAGE ?= $(ENGINE) run --rm flash:$(VERSION)
-VERSION = $(shell sed -n 's/^project(flash VERSION \([0-9.]*\) .*/\1/p' CMakeLists.txt)
+VERSION = $(word 3,$(shell grep '^project.flash ' CMakeLists.txt))
 
 sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
