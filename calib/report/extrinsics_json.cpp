@@ -115,21 +115,22 @@ Json along_json(const PlaceAlong& along, const HandEyePoses& poses) {
   return json;
 }
 
-/// Of the errors from the `first` on, each times its scale.
-Json errors_json(const JointErrors& errors, Eigen::Index first, const Eigen::VectorXd& scale,
-                 const std::string& unit) {
-  const Eigen::Index count = scale.size();
-  Json json = {
-      {"estimate_" + unit, list(Eigen::VectorXd(scale.cwiseProduct(errors.estimate.segment(first, count))))},
-      {"sd_" + unit, list(Eigen::VectorXd(scale.cwiseProduct(errors.sd.segment(first, count))))}};
-  Json intervals = Json::array(), told = Json::array();
-  for (Eigen::Index i = first; i < first + count; ++i) {
-    intervals.push_back(list(Eigen::Vector2d(scale[i - first] * errors.interval(i))));
-    told.push_back(errors.told(i));
+/// Of these errors, in `unit`, of which one of SI has `scale`; null stands for those of another.
+Json errors_json(const JointErrors& errors, const std::vector<std::optional<Eigen::Index>>& which,
+                 double scale, const std::string& unit) {
+  Json estimates = Json::array(), deviations = Json::array(), intervals = Json::array();
+  for (const std::optional<Eigen::Index>& i : which) {
+    estimates.push_back(i ? Json(scale * errors.estimate[*i]) : Json(nullptr));
+    deviations.push_back(i ? Json(scale * errors.sd[*i]) : Json(nullptr));
+    intervals.push_back(i ? list(Eigen::Vector2d(scale * errors.interval(*i))) : Json(nullptr));
   }
-  json["interval_" + unit] = std::move(intervals);
-  json["told"] = std::move(told);
-  return json;
+  return {{"estimate_" + unit, estimates}, {"sd_" + unit, deviations}, {"interval_" + unit, intervals}};
+}
+
+Json told_json(const JointErrors& errors, Eigen::Index first, Eigen::Index count) {
+  Json told = Json::array();
+  for (Eigen::Index i = first; i < first + count; ++i) told.push_back(errors.told(i));
+  return told;
 }
 
 Json origin_json(const Eigen::Isometry3d& origin) {
@@ -144,16 +145,17 @@ void add_joint_errors(const Calibration& calibration, const Extrinsics& extrinsi
   if (!errors || !extrinsics.inputs.arm) return;
   const ArmModel& arm = *extrinsics.inputs.arm;
   const auto lengths = static_cast<Eigen::Index>(arm.lengths.size()), zeros = errors->sd.size() - lengths;
-  Eigen::VectorXd scale(zeros);
-  Json units = Json::array();
+  std::vector<std::optional<Eigen::Index>> turning, sliding, all;
   for (const Joint& joint : arm.chain.joints) {
     if (joint.kind == Joint::Kind::fixed) continue;
+    const auto i = static_cast<Eigen::Index>(turning.size());
     const bool turns = joint.kind == Joint::Kind::revolute;
-    scale[static_cast<Eigen::Index>(units.size())] = turns ? kDegrees : 1e3;
-    units.push_back(turns ? "deg" : "mm");
+    turning.push_back(turns ? std::optional(i) : std::nullopt);
+    sliding.push_back(turns ? std::nullopt : std::optional(i));
   }
-  json["joint_zeros"] = {{"joints", moving_joints(arm.chain)}, {"units", units}};
-  json["joint_zeros"].update(errors_json(*errors, 0, scale, "deg"));
+  json["joint_zeros"] = {{"joints", moving_joints(arm.chain)}, {"told", told_json(*errors, 0, zeros)}};
+  json["joint_zeros"].update(errors_json(*errors, turning, kDegrees, "deg"));
+  json["joint_zeros"].update(errors_json(*errors, sliding, 1e3, "mm"));
   json["joint_origins"] = Json::array();
   for (const JointOrigin& origin : extrinsics.joint_origins)
     json["joint_origins"].push_back({{"joint", origin.joint},
@@ -165,9 +167,12 @@ void add_joint_errors(const Calibration& calibration, const Extrinsics& extrinsi
     joints.push_back(arm.chain.joints[length.joint].name);
     directions.push_back(list(Eigen::Vector3d(length.direction.array() + 0.0)));  // no minus zero
   }
-  json["link_lengths"] = {
-      {"prior_sd_mm", 1e3 * arm.length_sd}, {"joints", joints}, {"directions", directions}};
-  json["link_lengths"].update(errors_json(*errors, zeros, Eigen::VectorXd::Constant(lengths, 1e3), "mm"));
+  for (Eigen::Index i = 0; i < lengths; ++i) all.emplace_back(zeros + i);
+  json["link_lengths"] = {{"prior_sd_mm", 1e3 * arm.length_sd},
+                          {"joints", joints},
+                          {"directions", directions},
+                          {"told", told_json(*errors, zeros, lengths)}};
+  json["link_lengths"].update(errors_json(*errors, all, 1e3, "mm"));
 }
 
 Json depth_json(const DepthUse& depth) {

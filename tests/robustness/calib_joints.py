@@ -75,8 +75,8 @@ def forward(text, q):
 def as_answered(answer, q):
     """The same of the described arm at q and the zeros of the answer, with its lengths."""
     solved = answer["joint_zeros"]
-    zeros = {name: value / 1e3 if unit == "mm" else math.radians(value)
-             for name, value, unit in zip(solved["joints"], solved["estimate_deg"], solved["units"], strict=True)}
+    zeros = {name: slid / 1e3 if turned is None else math.radians(turned)
+             for name, turned, slid in zip(solved["joints"], solved["estimate_deg"], solved["estimate_mm"], strict=True)}
     lengths = answer["link_lengths"]
     R, t = [[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0, 0]
     for name, value in zip([*AXES, "flange"], [*q, 0]):

@@ -64,7 +64,8 @@ HandEyeScene arm_of(Setup setup, unsigned seed) {
 class SmoothErrorsOfPairsTest : public testing::TestWithParam<Setup> {};
 
 TEST_P(SmoothErrorsOfPairsTest, OfAWrongKinematicModelAreMostlyCovered) {
-  // A field is a stand-in for joints that it knows nothing of. Of what scatters alone next to none hold the truth.
+  // A field is a stand-in for joints that it knows nothing of. Of what scatters alone next to none hold the
+  // truth.
   constexpr int kTrials = 40;
   int by_scatter = 0, covered = 0;
   for (unsigned seed = 501; seed < 501 + kTrials; ++seed) {
