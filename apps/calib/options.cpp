@@ -40,13 +40,13 @@ void add_link_option(CLI::App& verb, DatasetChoice& choice) {
   verb.add_option_function<std::string>(
           "--link-lengths",
           [&choice](const std::string& text) {
-            constexpr double kMost = 50;  // of which no link is off [mm]
+            constexpr double kLeast = 1e-3,
+                             kMost = 50;  // better than any is measured, and what none is off [mm]
             const std::optional<double> sd =
                 text == "usual" ? 1e3 * calib::kUsualLinkLength : data::parse_number(text);
-            if (!sd || !(*sd > 0 && *sd <= kMost))
-              throw CLI::ValidationError("--link-lengths", "found \"" + text +
-                                                               "\", expected usual, or millimetres above 0, "
-                                                               "up to 50");
+            if (!sd || !(*sd >= kLeast && *sd <= kMost))
+              throw CLI::ValidationError(
+                  "--link-lengths", "found \"" + text + "\", expected usual, or 0.001 to 50 millimetres");
             choice.link_length_sd = 1e-3 * *sd;
           },
           "Solve for the lengths of the arm's links too, each known to so many millimetres (one standard "

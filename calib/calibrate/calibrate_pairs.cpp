@@ -204,10 +204,19 @@ void tell_unseen(Calibration& result, const std::vector<Observation>& observatio
              false);
 }
 
-std::vector<Eigen::Isometry3d> robot_poses(const std::vector<Observation>& observations) {
+/// What errors that change smoothly with the robot's pose may have done, beside what scatters.
+void add_smooth_errors(Calibration& result, const std::vector<Observation>& observations,
+                       const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit) {
   std::vector<Eigen::Isometry3d> poses;
   for (const Observation& observation : observations) poses.push_back(observation.T_base_gripper);
-  return poses;
+  const auto smooth = smooth_errors_of_pairs(result.setup, poses, loops, fit,
+                                             {result.repeatable, result.size->sd, result.size->prior_sd});
+  if (!smooth) return;
+  result.pose_errors = smooth->arm;
+  result.covariance = smooth->covariance;
+  raise_to(result.repeatable, result.covariance);
+  result.size->sd = std::max(result.size->sd, smooth->size_sd);
+  tell_smooth_errors(result, growth(result.repeatable, result.covariance));
 }
 
 }  // namespace
@@ -258,19 +267,9 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .poses = fit.poses,
                                .relative = relative_rms(compared, fit.poses.X),
                                .held_out = result.held_out});
-  if (!axis) {
-    if (const auto smooth = smooth_errors_of_pairs(setup, robot_poses(observations), loops, fit)) {
-      result.pose_errors = smooth->arm;
-      result.covariance = smooth->covariance;
-      raise_to(result.repeatable, result.covariance);
-      tell_smooth_errors(result, growth(result.repeatable, result.covariance));
-    }
-  }
-  if (result.size->sd > 0) {
-    const Matrix6d by_size = covariance_of_size(loops, fit.poses, along, result.size->sd);
-    result.repeatable += by_size;
-    result.covariance += by_size;
-  }
+  if (result.size->sd > 0)
+    result.repeatable = result.covariance += covariance_of_size(loops, fit.poses, along, result.size->sd);
+  if (!axis) add_smooth_errors(result, observations, loops, fit);
   check_halves(result, loops, places, along);
   finish(result, observations);
   tell_size(result, loops, along, settings);

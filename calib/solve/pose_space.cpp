@@ -44,14 +44,12 @@ struct LoopRows {
 
 LoopRows rows_of(const PoseLoop& loop, const HandEyePoses& poses, const CameraShare& share) {
   const LinearLoop linear = linear_loop(loop, poses);
-  const Eigen::Isometry3d predicted = poses.X.inverse() * loop.G.inverse() * poses.Z;
   LoopRows rows;
   rows.sight = linear.sight;
   const Eigen::Vector3d dt = linear.residual.head<3>();
   // A residual that is the camera's grows with the size: that over the size counts.
   const Eigen::Vector3d along = rows.sight * rows.sight.dot(dt);
-  const Eigen::Vector3d d_size = predicted.linear().transpose() * loop.C.translation() -
-                                 share.across * (dt - along) - share.along * along;
+  const Eigen::Vector3d d_size = linear.by_size.head<3>() - share.across * (dt - along) - share.along * along;
   rows.translation << linear.by_poses.topRows<3>(), d_size, dt;
   rows.rotation << linear.by_poses.bottomRows<3>(), Eigen::Vector3d::Zero(), linear.residual.tail<3>();
   return rows;
@@ -123,6 +121,7 @@ LinearLoop linear_loop(const PoseLoop& loop, const HandEyePoses& poses) {
   linear.by_predicted << -Eigen::Matrix3d::Identity(), skew(E.translation()), Eigen::Matrix3d::Zero(),
       -right_jacobian_inverse(angle) * E.linear().transpose();
   linear.by_poses << -linear.by_predicted * adjoint(predicted.inverse()), linear.by_predicted;
+  linear.by_size << predicted.linear().transpose() * loop.C.translation(), Eigen::Vector3d::Zero();
   linear.sight = line_of_sight(loop, predicted);
   return linear;
 }

@@ -53,7 +53,8 @@ struct LinearLoop {
   Vector6d residual;
   Eigen::Matrix<double, 6, 12> by_poses;  ///< X, then Z, right perturbations
   Matrix6d by_predicted;                  ///< the target's predicted pose, likewise
-  Eigen::Vector3d sight;                  ///< unit, along the line of sight; zero where there is none
+  Vector6d by_size;       ///< the log of the size of the target, where the noise is the robot's
+  Eigen::Vector3d sight;  ///< unit, along the line of sight; zero where there is none
 };
 LinearLoop linear_loop(const PoseLoop& loop, const HandEyePoses& poses);
 

@@ -31,9 +31,9 @@ Matrix6d scatter_columns(const LinearLoop& linear, const PoseSpaceFit& fit) {
 
 std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
     Setup setup, const std::vector<Eigen::Isometry3d>& T_base_gripper, const std::vector<PoseLoop>& loops,
-    const PoseSpaceFit& fit) {
+    const PoseSpaceFit& fit, const ScatterOfPairs& scatter) {
   if (loops.size() < kFewestPosesOfArm) return std::nullopt;
-  constexpr Eigen::Index kShared = 12;
+  const Eigen::Index poses = 12, s = poses + (scatter.size_sd > 0 ? 1 : 0);
   constexpr double kKnown =
       0.01;  // of the variance of a pair's scatter: the rest is estimated beside each field
   const Eigen::Vector2d noise(std::pow(fit.translation.across, 2), std::pow(fit.rotation, 2));
@@ -42,33 +42,40 @@ std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Eigen::Isometry3d& T : T_base_gripper)
     middle += T.translation() / static_cast<double>(T_base_gripper.size());
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(s + 1, s + 1);
+  if (s > poses) prior(poses, poses) = std::pow(scatter.size_prior, -2);
   std::vector<PoseModes> modes;
   std::vector<PoseInformation> seen;
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(kShared, kShared),
-                  gains(kShared, 6 * static_cast<Eigen::Index>(loops.size()));
+  Eigen::MatrixXd information = prior.topLeftCorner(s, s),
+                  gains(s, 6 * static_cast<Eigen::Index>(loops.size()));
   for (std::size_t i = 0; i < loops.size(); ++i) {
     const LinearLoop linear = linear_loop(loops[i], fit.poses);
+    Eigen::MatrixXd by_shared(6, s);
+    by_shared.leftCols(poses) = linear.by_poses;
+    if (s > poses) by_shared.col(poses) = linear.by_size;
     const Matrix6d J = by_error(setup, T_base_gripper[i], linear, fit.poses),
-                   scatter = scatter_columns(linear, fit);
-    const Matrix6d W = (scatter * variances.asDiagonal() * scatter.transpose()).inverse(), known = W / kKnown;
-    information += linear.by_poses.transpose() * W * linear.by_poses;
-    gains.middleCols<6>(6 * static_cast<Eigen::Index>(i)) = linear.by_poses.transpose() * W * J;
+                   columns = scatter_columns(linear, fit);
+    const Matrix6d W = (columns * variances.asDiagonal() * columns.transpose()).inverse(), known = W / kKnown;
+    information += by_shared.transpose() * W * by_shared;
+    gains.middleCols<6>(6 * static_cast<Eigen::Index>(i)) = by_shared.transpose() * W * J;
     seen.push_back({.H = J.transpose() * known * J,
-                    .H_s = J.transpose() * known * linear.by_poses,
-                    .H_ss = linear.by_poses.transpose() * known * linear.by_poses,
+                    .H_s = J.transpose() * known * by_shared,
+                    .H_ss = by_shared.transpose() * known * by_shared,
                     .g = J.transpose() * known * linear.residual,
-                    .g_s = linear.by_poses.transpose() * known * linear.residual});
+                    .g_s = by_shared.transpose() * known * linear.residual});
     PoseModes& mode = modes.emplace_back(modes_at(T_base_gripper[i], Eigen::Vector3d::Zero(), middle));
-    const Matrix6d as_errors = J.partialPivLu().solve(scatter);  // which make this scatter
+    const Matrix6d as_errors = J.partialPivLu().solve(columns);  // which make this scatter
     mode.translation = as_errors.leftCols<3>();
     mode.rotation = as_errors.rightCols<3>();
   }
-  const ArmErrorFit arm = fit_arm_errors(modes, seen, Eigen::MatrixXd::Zero(kShared + 1, kShared + 1), noise);
-  const Eigen::LDLT<Eigen::MatrixXd> shared(information);
+  const ArmErrorFit arm = fit_arm_errors(modes, seen, prior, noise);
   // In place of the independent scatter stands, by its share, what was found.
-  const Eigen::MatrixXd instead = shared.solve(gains) * arm.covariance * shared.solve(gains).transpose();
-  const Matrix6d scatter = fit.covariance.topLeftCorner<6, 6>();
-  return SmoothErrorsOfPairs{arm.errors, (1 - arm.errors.share) * scatter + instead.topLeftCorner<6, 6>()};
+  const Eigen::MatrixXd moved_by = information.ldlt().solve(gains),
+                        instead = moved_by * arm.covariance * moved_by.transpose();
+  const double rest = 1 - arm.errors.share;
+  SmoothErrorsOfPairs result{arm.errors, rest * scatter.covariance + instead.topLeftCorner<6, 6>()};
+  if (s > poses) result.size_sd = std::sqrt(rest * std::pow(scatter.size_sd, 2) + instead(poses, poses));
+  return result;
 }
 
 }  // namespace flash::calib

@@ -161,9 +161,10 @@ def refused(calib, work, given, into, file, robot):
     program.must(calib, "handeye", work / "set", "-o", poses, "--cache", work / "cache")
     with_file = lambda path: (*into[:5], path, *into[6:])
     for words, expected in (((*given, "--link-lengths", "-0.3"), "--link-lengths"),
-                            ((*given, "--link-lengths", "0"), 'found "0", expected usual, or millimetres above 0'),
+                            ((*given, "--link-lengths", "0"), 'found "0", expected usual, or 0.001 to 50 millimetres'),
+                            ((*given, "--link-lengths", "1e-160"), 'found "1e-160", expected usual, or 0.001 to 50 millimetres'),
                             ((*given, "--link-lengths", "nan"), 'found "nan"'),
-                            ((*given, "--link-lengths", "500"), "up to 50"),
+                            ((*given, "--link-lengths", "500"), "0.001 to 50"),
                             (("handeye", work / "set", "--link-lengths", "0.3"), "--robot"),
                             ((*given[:3], work / "named.csv", *given[4:], "--link-lengths", "0.3"), "found no column of joint pitch"),
                             (with_file(other), "joint pitch: found it 0 times"),
