@@ -13,9 +13,7 @@ namespace flash::calib {
 namespace {
 
 constexpr int kOwn = PoseModes::kOwn, kModes = PoseModes::kSmooth;
-// Of the rms distance between two poses, each as likely as it is long: errors of a model change over a radian
-// of the joints or so, and recordings move by less.
-constexpr double kReaches[] = {0.5, 1, 2, 4, 8};
+constexpr double kReaches[] = {0.5, 1, 2, 4, 8};  // of the rms distance between two poses
 // Turns [rad], a factor of two apart: 0.006 to 0.4 deg.
 constexpr double kSizes[] = {1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3};
 constexpr double kUsualSize = 0.1 * M_PI / 180, kSizeSpread = 1;  // of its logarithm
@@ -212,15 +210,14 @@ std::vector<Candidate> candidates(const std::vector<PoseModes>& modes, const See
       candidate.fit = fit_variances(seen.beta, I + size * size * fields, M, unit);
       errors.gain = std::max(errors.gain, independent - candidate.fit.deviance);
       const double unusual = std::log(size / kUsualSize) / kSizeSpread;
-      candidate.weight = 0.5 * (independent - candidate.fit.deviance - unusual * unusual) + std::log(reach);
+      candidate.weight = 0.5 * (independent - candidate.fit.deviance - unusual * unusual);
     }
   }
   double largest = 0;
   for (const Candidate& candidate : list) largest = std::max(largest, candidate.weight);
   double prior = 0, sum = std::exp(-largest);
-  for (const double reach : kReaches)
-    for (const double size : kSizes)
-      prior += reach * std::exp(-0.5 * std::pow(std::log(size / kUsualSize) / kSizeSpread, 2));
+  for (const double size : kSizes)
+    prior += std::size(kReaches) * std::exp(-0.5 * std::pow(std::log(size / kUsualSize) / kSizeSpread, 2));
   for (Candidate& candidate : list)
     sum += candidate.weight = kOdds / prior * std::exp(candidate.weight - largest);
   for (Candidate& candidate : list) candidate.weight /= sum;
