@@ -40,8 +40,8 @@ void add_link_option(CLI::App& verb, DatasetChoice& choice) {
   verb.add_option_function<std::string>(
           "--link-lengths",
           [&choice](const std::string& text) {
-            constexpr double kLeast = 1e-3,
-                             kMost = 50;  // better than any is measured, and what none is off [mm]
+            constexpr double kLeast = 1e-3;  // no link is known better [mm]
+            constexpr double kMost = 50;     // none is farther off [mm]
             const std::optional<double> sd =
                 text == "usual" ? 1e3 * calib::kUsualLinkLength : data::parse_number(text);
             if (!sd || !(*sd >= kLeast && *sd <= kMost))

@@ -84,6 +84,16 @@ Eigen::Isometry3d read_origin(const data::JsonObject& origin) {
   return T;
 }
 
+Joint read_joint(const data::JsonObject& origin) {
+  Joint joint{.name = origin.string("joint"), .origin = read_origin(origin.object("described"))};
+  const std::string kind = origin.string("kind");
+  for (const Joint::Kind other : {Joint::Kind::revolute, Joint::Kind::prismatic})
+    if (kind == to_string(other)) joint.kind = other;
+  if (kind != to_string(joint.kind)) throw origin.error("kind", "fixed, revolute or prismatic");
+  if (joint.kind != Joint::Kind::fixed) joint.axis = origin.vector("axis", 3);
+  return joint;
+}
+
 }  // namespace
 
 Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs) {
@@ -182,8 +192,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
     }
   }
   for (const data::JsonObject& origin : object.objects("joint_origins"))
-    extrinsics.joint_origins.push_back({origin.string("joint"), read_origin(origin.object("described")),
-                                        read_origin(origin.object("corrected"))});
+    extrinsics.joint_origins.push_back({read_joint(origin), read_origin(origin.object("corrected"))});
   if (object.has("link_lengths"))
     extrinsics.inputs.link_length_sd = 1e-3 * object.object("link_lengths").positive("prior_sd_mm");
   if (object.has("time_offset")) {

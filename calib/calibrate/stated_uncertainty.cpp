@@ -13,6 +13,26 @@ namespace {
 
 constexpr double kDegree = M_PI / 180;
 
+/// Without what the priors of joints and links leave open of X: another recording of the arm has the same. Of
+/// estimates under a prior P, C - C P C scatters.
+Matrix6d without_joint_priors(const Matrix6d& of_X, const Refinement& refined, const SharedColumns& columns) {
+  if (columns.joint_errors.empty()) return of_X;
+  Matrix6d scatter = of_X;
+  for (std::size_t arm = 0; arm < columns.joint_errors.size(); ++arm) {
+    if (columns.joint_errors[arm] < 0) continue;
+    const Eigen::VectorXd& sd = refined.bundle.joint_error_sd[arm];
+    const Eigen::MatrixXd C = refined.covariance.block(0, columns.joint_errors[arm], 6, sd.size());
+    scatter -= C * sd.cwiseAbs2().cwiseInverse().asDiagonal() * C.transpose();
+  }
+  // Noise levels are uncertain themselves, which widens C: nothing need be left of a direction.
+  constexpr double kLeast = 1e-4;
+  const Eigen::LLT<Matrix6d> root(of_X);
+  const Matrix6d share = root.matrixL().solve(root.matrixL().solve(scatter).transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(share);
+  const Matrix6d L = root.matrixL() * eigen.eigenvectors();
+  return L * eigen.eigenvalues().cwiseMax(kLeast).asDiagonal() * L.transpose();
+}
+
 /// The parts of a recording: by how much they disagree beyond noise, factors of variances.
 struct Parts {
   double views = 1, halves = 1;
@@ -62,8 +82,9 @@ double add_uncertainty(Calibration& result, const SystematicUncertainty& systema
   result.lens_view_factor = lens_disagreement(result.refined, settings);
   result.shared_covariance = with_lens_raised(systematic.covariance, columns, result.lens_view_factor);
   result.covariance = result.shared_covariance.topLeftCorner<6, 6>();
-  result.repeatable =
-      with_lens_raised(result.refined.covariance, columns, result.lens_view_factor).topLeftCorner<6, 6>();
+  result.repeatable = without_joint_priors(
+      with_lens_raised(result.refined.covariance, columns, result.lens_view_factor).topLeftCorner<6, 6>(),
+      result.refined, columns);
   result.pose_errors = systematic.arms.front();
   return growth(result.repeatable, result.covariance);
 }

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "calib/dataset/camera_marks.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
@@ -20,6 +21,7 @@ using data::InputError;
 struct Link {
   const tinyxml2::XMLElement* joint;  ///< that carries it
   std::string parent;                 ///< link before it
+  bool camera = false;                ///< an earlier export put it there: no part of the robot
 };
 
 std::string attribute(const tinyxml2::XMLElement* element, const char* name) {
@@ -42,25 +44,38 @@ Eigen::Vector3d three_numbers(const std::string& text, const Eigen::Vector3d& ot
   return Eigen::Vector3d(values[0], values[1], values[2]);
 }
 
-Joint joint_of(const tinyxml2::XMLElement& element, const std::string& path) {
-  Joint joint{.name = attribute(&element, "name")};
-  const std::string field = "joint " + joint.name, kind = attribute(&element, "type");
-  if (kind == "revolute" || kind == "continuous")
-    joint.kind = Joint::Kind::revolute;
-  else if (kind == "prismatic")
-    joint.kind = Joint::Kind::prismatic;
-  else if (kind != "fixed")
-    throw input_error(path, field,
-                      "found type \"" + kind + "\", expected revolute, continuous, prismatic or fixed");
-  joint.origin = urdf_origin(element, path);
-  joint.axis = three_numbers(attribute(element.FirstChildElement("axis"), "xyz"), Eigen::Vector3d::UnitX(),
-                             path, field + ", axis");
-  if (joint.kind == Joint::Kind::fixed) return joint;
-  if (!(joint.axis.norm() > 1e-6)) throw input_error(path, field, "found an axis of no length");
-  joint.axis.normalize();
-  if (element.FirstChildElement("mimic"))
-    throw input_error(path, field, "follows another joint (mimic), expected one that moves by itself");
-  return joint;
+/// Where a joint stands in the frame of the one before.
+Eigen::Isometry3d origin_of(const tinyxml2::XMLElement& joint, const std::string& path) {
+  const tinyxml2::XMLElement* const origin = joint.FirstChildElement("origin");
+  const std::string field = "joint " + attribute(&joint, "name");
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = rotation_of_rpy(three_numbers(attribute(origin, "rpy"), none, path, field + ", rpy"));
+  T.translation() = three_numbers(attribute(origin, "xyz"), none, path, field + ", xyz");
+  return T;
+}
+
+/// Whether a remark begins with this.
+bool begins_with(const tinyxml2::XMLNode& node, const std::string& mark) {
+  return node.ToComment() && std::string(node.Value()).compare(0, mark.size(), mark) == 0;
+}
+
+/// The joints of a robot by the link that each carries.
+std::map<std::string, Link> joints_of(const tinyxml2::XMLElement& robot, const std::string& path) {
+  std::map<std::string, Link> carried;
+  bool camera = false;
+  for (const auto* node = robot.FirstChild(); node; node = node->NextSibling()) {
+    camera = begins_with(*node, kCameraMark) || (camera && !begins_with(*node, kCameraEndMark));
+    const tinyxml2::XMLElement* const element = node->ToElement();
+    if (!element || element->Name() != std::string("joint")) continue;
+    const std::string parent = attribute(element->FirstChildElement("parent"), "link"),
+                      child = attribute(element->FirstChildElement("child"), "link");
+    if (parent.empty() || child.empty())
+      throw input_error(path, "joint " + attribute(element, "name"), "expected a parent and a child link");
+    if (!carried.emplace(child, Link{element, parent, camera}).second)
+      throw input_error(path, "link " + child, "hangs on two joints");
+  }
+  return carried;
 }
 
 /// The only one of the links that qualifies.
@@ -74,14 +89,25 @@ std::string only(const std::set<std::string>& links, const std::string& path, co
 
 }  // namespace
 
-Eigen::Isometry3d urdf_origin(const tinyxml2::XMLElement& joint, const std::string& path) {
-  const tinyxml2::XMLElement* const origin = joint.FirstChildElement("origin");
-  const std::string field = "joint " + attribute(&joint, "name");
-  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = rotation_of_rpy(three_numbers(attribute(origin, "rpy"), none, path, field + ", rpy"));
-  T.translation() = three_numbers(attribute(origin, "xyz"), none, path, field + ", xyz");
-  return T;
+Joint urdf_joint(const tinyxml2::XMLElement& element, const std::string& path) {
+  Joint joint{.name = attribute(&element, "name")};
+  const std::string field = "joint " + joint.name, kind = attribute(&element, "type");
+  if (kind == "revolute" || kind == "continuous")
+    joint.kind = Joint::Kind::revolute;
+  else if (kind == "prismatic")
+    joint.kind = Joint::Kind::prismatic;
+  else if (kind != "fixed")
+    throw input_error(path, field,
+                      "found type \"" + kind + "\", expected revolute, continuous, prismatic or fixed");
+  joint.origin = origin_of(element, path);
+  joint.axis = three_numbers(attribute(element.FirstChildElement("axis"), "xyz"), Eigen::Vector3d::UnitX(),
+                             path, field + ", axis");
+  if (joint.kind == Joint::Kind::fixed) return joint;
+  if (!(joint.axis.norm() > 1e-6)) throw input_error(path, field, "found an axis of no length");
+  joint.axis.normalize();
+  if (element.FirstChildElement("mimic"))
+    throw input_error(path, field, "follows another joint (mimic), expected one that moves by itself");
+  return joint;
 }
 
 SerialChain load_urdf(const std::string& path, const std::string& base, const std::string& tip) {
@@ -92,22 +118,14 @@ SerialChain load_urdf(const std::string& path, const std::string& base, const st
     throw InputError(path + ": line " + std::to_string(document.ErrorLineNum()) + ": expected XML");
   const tinyxml2::XMLElement* const robot = document.FirstChildElement("robot");
   if (!robot) throw InputError(path + ": found no element robot, expected a URDF (expand xacro first)");
-  std::map<std::string, Link> carried;
+  const std::map<std::string, Link> carried = joints_of(*robot, path);
   std::set<std::string> parents, roots, leaves;
-  for (const auto* element = robot->FirstChildElement("joint"); element;
-       element = element->NextSiblingElement("joint")) {
-    const std::string parent = attribute(element->FirstChildElement("parent"), "link"),
-                      child = attribute(element->FirstChildElement("child"), "link");
-    if (parent.empty() || child.empty())
-      throw input_error(path, "joint " + attribute(element, "name"), "expected a parent and a child link");
-    if (!carried.emplace(child, Link{element, parent}).second)
-      throw input_error(path, "link " + child, "hangs on two joints");
-    parents.insert(parent);
-  }
+  for (const auto& [child, link] : carried)
+    if (!link.camera) parents.insert(link.parent);
   for (const std::string& parent : parents)
     if (carried.count(parent) == 0) roots.insert(parent);
   for (const auto& [child, link] : carried)
-    if (parents.count(child) == 0) leaves.insert(child);
+    if (!link.camera && parents.count(child) == 0) leaves.insert(child);
   const std::string first = base.empty() ? only(roots, path, "the base (--base-link)") : base;
   const std::string last = tip.empty() ? only(leaves, path, "the gripper (--tip-link)") : tip;
   SerialChain chain;
@@ -116,7 +134,7 @@ SerialChain load_urdf(const std::string& path, const std::string& base, const st
     if (found == carried.end() || chain.joints.size() > carried.size())
       throw InputError(path + ": found no chain of joints from link " + first + " to link " + last);
     // Other joints, such as those of fingers, may be of any kind.
-    chain.joints.push_back(joint_of(*found->second.joint, path));
+    chain.joints.push_back(urdf_joint(*found->second.joint, path));
     link = found->second.parent;
   }
   std::reverse(chain.joints.begin(), chain.joints.end());

@@ -1,7 +1,5 @@
 #include "calib/geometry/arm_model.h"
 
-#include <algorithm>
-
 #include "calib/geometry/pose.h"
 
 namespace flash::calib {
@@ -75,13 +73,8 @@ SerialChain corrected_chain(const ArmModel& arm, const Eigen::VectorXd& errors) 
 std::vector<JointOrigin> joint_origins(const ArmModel& arm, const Eigen::VectorXd& errors) {
   const SerialChain corrected = corrected_chain(arm, errors);
   std::vector<JointOrigin> origins;
-  for (std::size_t k = 0; k < corrected.joints.size(); ++k) {
-    const Joint& joint = arm.chain.joints[k];
-    const bool lengthened = std::any_of(arm.lengths.begin(), arm.lengths.end(),
-                                        [k](const LinkLength& length) { return length.joint == k; });
-    if (joint.kind != Joint::Kind::fixed || lengthened)
-      origins.push_back({joint.name, joint.origin, corrected.joints[k].origin});
-  }
+  for (std::size_t k = 0; k < corrected.joints.size(); ++k)
+    origins.push_back({arm.chain.joints[k], corrected.joints[k].origin});
   return origins;
 }
 

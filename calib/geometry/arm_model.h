@@ -42,13 +42,13 @@ Eigen::VectorXd prior_deviations(const ArmModel& arm);
 /// links so much longer. errors: as of error_motions() [rad, m].
 SerialChain corrected_chain(const ArmModel& arm, const Eigen::VectorXd& errors);
 
-/// A joint's origin in the frame of the joint before, as described and as corrected_chain() has it.
+/// A joint as described, and where corrected_chain() has it in the frame of the joint before.
 struct JointOrigin {
-  std::string joint;
-  Eigen::Isometry3d described = Eigen::Isometry3d::Identity(), corrected = described;
+  Joint joint;
+  Eigen::Isometry3d corrected = joint.origin;
 };
 
-/// Of all joints whose origins errors are in.
+/// Of all joints, from the base to the gripper.
 std::vector<JointOrigin> joint_origins(const ArmModel& arm, const Eigen::VectorXd& errors);
 
 }  // namespace flash::calib

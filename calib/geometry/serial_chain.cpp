@@ -2,6 +2,18 @@
 
 namespace flash::calib {
 
+const char* to_string(Joint::Kind kind) {
+  switch (kind) {
+    case Joint::Kind::revolute:
+      return "revolute";
+    case Joint::Kind::prismatic:
+      return "prismatic";
+    case Joint::Kind::fixed:
+      break;
+  }
+  return "fixed";
+}
+
 Vector6d motion_of(const Joint& joint) {
   Vector6d xi = Vector6d::Zero();
   if (joint.kind == Joint::Kind::revolute) xi.tail<3>() = joint.axis;

@@ -16,6 +16,8 @@ struct Joint {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();           ///< in its own frame, of length 1
 };
 
+const char* to_string(Joint::Kind kind);
+
 /// Joints one after the other, from the base to the gripper.
 struct SerialChain {
   std::vector<Joint> joints;

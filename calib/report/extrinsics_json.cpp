@@ -158,9 +158,12 @@ void add_joint_errors(const Calibration& calibration, const Extrinsics& extrinsi
   json["joint_zeros"].update(errors_json(*errors, sliding, 1e3, "mm"));
   json["joint_origins"] = Json::array();
   for (const JointOrigin& origin : extrinsics.joint_origins)
-    json["joint_origins"].push_back({{"joint", origin.joint},
-                                     {"described", origin_json(origin.described)},
-                                     {"corrected", origin_json(origin.corrected)}});
+    json["joint_origins"].push_back(
+        {{"joint", origin.joint.name},
+         {"kind", to_string(origin.joint.kind)},
+         {"axis", origin.joint.kind == Joint::Kind::fixed ? Json(nullptr) : Json(list(origin.joint.axis))},
+         {"described", origin_json(origin.joint.origin)},
+         {"corrected", origin_json(origin.corrected)}});
   if (lengths == 0) return;
   Json joints = Json::array(), directions = Json::array();
   for (const LinkLength& length : arm.lengths) {

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <vector>
 
+#include "calib/dataset/camera_marks.h"
 #include "calib/report/xml_text.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
@@ -16,8 +17,8 @@ namespace {
 
 using data::input_error;
 
-std::string first_mark(const std::string& camera) { return "<!-- flash-calib: " + camera + " -->"; }
-std::string last_mark(const std::string& camera) { return "<!-- end of flash-calib: " + camera + " -->"; }
+std::string first_mark(const std::string& camera) { return "<!--" + kCameraMark + camera + " -->"; }
+std::string last_mark(const std::string& camera) { return "<!--" + kCameraEndMark + camera + " -->"; }
 
 /// Without the lines that an earlier call added. Throws where one of its two marks is missing.
 std::string without_camera(std::string text, const std::string& path, const std::string& camera) {

@@ -12,22 +12,38 @@
 namespace flash::calib {
 namespace {
 
-struct Place {
-  const tinyxml2::XMLElement* joint = nullptr;
-  std::size_t number = 0;  ///< among all elements `joint`, those of transmissions too
-};
-
 /// The joints of the robot itself of that name.
-std::vector<Place> joints_named(const tinyxml2::XMLElement& element, const std::string& name, bool robot,
-                                std::size_t& number) {
-  std::vector<Place> found;
-  for (const auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) {
-    const bool joint = std::string("joint") == child->Name();
-    if (joint && robot && child->Attribute("name", name.c_str())) found.push_back({child, number});
-    number += joint ? 1 : 0;
-    joints_named(*child, name, false, number);
-  }
+std::vector<const tinyxml2::XMLElement*> joints_named(const tinyxml2::XMLElement& robot,
+                                                      const std::string& name) {
+  std::vector<const tinyxml2::XMLElement*> found;
+  for (const auto* joint = robot.FirstChildElement("joint"); joint;
+       joint = joint->NextSiblingElement("joint"))
+    if (joint->Attribute("name", name.c_str())) found.push_back(joint);
   return found;
+}
+
+/// Counts the elements of its kind before `wanted`, in the order of the document; true where it comes.
+bool count_before(const tinyxml2::XMLElement& from, const tinyxml2::XMLElement& wanted, std::size_t& number) {
+  for (const auto* child = from.FirstChildElement(); child; child = child->NextSiblingElement()) {
+    if (child == &wanted) return true;
+    number += std::string(child->Name()) == wanted.Name() ? 1 : 0;
+    if (count_before(*child, wanted, number)) return true;
+  }
+  return false;
+}
+
+/// Where the tag of an element begins in the text without remarks.
+std::size_t place_of(const tinyxml2::XMLDocument& document, const tinyxml2::XMLElement& element,
+                     const std::string& visible) {
+  std::size_t number = 0;
+  count_before(*document.RootElement(), element, number);
+  return tag_of(visible, element.Name(), number);
+}
+
+std::string link_of(const tinyxml2::XMLElement& joint, const char* which) {
+  const auto* const link = joint.FirstChildElement(which);
+  const char* const name = link ? link->Attribute("link") : nullptr;
+  return name ? name : "";
 }
 
 bool same(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
@@ -39,6 +55,29 @@ std::string three(const Eigen::Vector3d& v) {
   char text[80];
   std::snprintf(text, sizeof text, "%.9g %.9g %.9g", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
   return text;
+}
+
+/// Throws where a joint of the file is not that of the calibration. parent: the link before it; empty: any.
+void expect_same(const tinyxml2::XMLElement& element, const JointOrigin& origin, const std::string& parent,
+                 const std::string& path) {
+  constexpr const char* kSameRobot = ", as the robot of the calibration has it";
+  const Joint &joint = origin.joint, present = urdf_joint(element, path);
+  const std::string field = "joint " + joint.name;
+  const auto refuse = [&](const std::string& found, const std::string& expected) {
+    throw data::input_error(path, field, "found " + found + ", expected " + expected + kSameRobot);
+  };
+  if (present.kind != joint.kind)
+    refuse(std::string("a ") + to_string(present.kind) + " joint",
+           std::string("a ") + to_string(joint.kind) + " one");
+  if (joint.kind != Joint::Kind::fixed && (present.axis - joint.axis).norm() > 1e-6)
+    refuse("axis " + three(present.axis), three(joint.axis));
+  const std::string link = link_of(element, "parent");
+  if (!parent.empty() && link != parent) refuse("parent " + link, parent);
+  const auto text = [](const Eigen::Isometry3d& T) {
+    return three(T.translation()) + ", rpy " + three(roll_pitch_yaw(T.linear()));
+  };
+  if (!same(present.origin, origin.corrected) && !same(present.origin, joint.origin))
+    refuse("origin " + text(present.origin), text(joint.origin));
 }
 
 /// A tag with that value of an attribute. begin: of the tag in the text.
@@ -68,37 +107,31 @@ void set_attribute(std::string& text, std::size_t begin, const std::string& name
 
 std::string with_joint_origins(const std::string& text, const std::string& path,
                                const std::vector<JointOrigin>& origins) {
-  tinyxml2::XMLDocument document;
-  parse_xml(text, path, "robot", document);
-  std::string result = text;
+  std::string result = text, parent;
   for (const JointOrigin& origin : origins) {
-    std::size_t number = 0;
-    const std::vector<Place> places = joints_named(*document.RootElement(), origin.joint, true, number);
-    const std::string field = "joint " + origin.joint;
-    if (places.size() != 1)
-      throw data::input_error(path, field,
-                              "found it " + std::to_string(places.size()) +
+    tinyxml2::XMLDocument document;
+    parse_xml(result, path, "robot", document);
+    const auto found = joints_named(*document.RootElement(), origin.joint.name);
+    if (found.size() != 1)
+      throw data::input_error(path, "joint " + origin.joint.name,
+                              "found it " + std::to_string(found.size()) +
                                   " times, expected once, as in the robot of the calibration");
-    const Eigen::Isometry3d present = urdf_origin(*places.front().joint, path);
-    if (!same(present, origin.corrected) && !same(present, origin.described)) {
-      const Eigen::Isometry3d& T = origin.described;
-      throw data::input_error(path, field,
-                              "found origin " + three(present.translation()) + ", rpy " +
-                                  three(roll_pitch_yaw(present.linear())) +
-                                  ", expected that of the calibration, " + three(T.translation()) + ", rpy " +
-                                  three(roll_pitch_yaw(T.linear())));
-    }
+    const tinyxml2::XMLElement& joint = *found.front();
+    expect_same(joint, origin, parent, path);
+    parent = link_of(joint, "child");
+    if (origin.corrected.matrix() == origin.joint.origin.matrix()) continue;
     const std::string xyz = three(origin.corrected.translation()),
                       rpy = three(roll_pitch_yaw(origin.corrected.linear()));
     const std::string visible = without_remarks(result);
-    const std::size_t joint = tag_of(visible, "joint", places.front().number);
-    const std::size_t inside = visible.substr(joint, visible.find("</joint", joint) - joint).find("<origin");
-    if (inside == std::string::npos) {
-      result.insert(end_of_tag(visible, joint) + 1, "<origin xyz=\"" + xyz + "\" rpy=\"" + rpy + "\"/>");
+    const tinyxml2::XMLElement* const present = joint.FirstChildElement("origin");
+    if (!present) {
+      const std::size_t begin = place_of(document, joint, visible);
+      result.insert(end_of_tag(visible, begin) + 1, "<origin xyz=\"" + xyz + "\" rpy=\"" + rpy + "\"/>");
       continue;
     }
-    set_attribute(result, joint + inside, "xyz", xyz);
-    set_attribute(result, joint + inside, "rpy", rpy);
+    const std::size_t begin = place_of(document, *present, visible);
+    set_attribute(result, begin, "xyz", xyz);
+    set_attribute(result, begin, "rpy", rpy);
   }
   return result;
 }

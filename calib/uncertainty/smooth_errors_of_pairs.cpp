@@ -34,8 +34,8 @@ std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
     const PoseSpaceFit& fit, const ScatterOfPairs& scatter) {
   if (loops.size() < kFewestPosesOfArm) return std::nullopt;
   const Eigen::Index poses = 12, s = poses + (scatter.size_sd > 0 ? 1 : 0);
-  constexpr double kKnown =
-      0.01;  // of the variance of a pair's scatter: the rest is estimated beside each field
+  // Of the variance of a pair's scatter: the rest is estimated beside each field.
+  constexpr double kKnown = 0.01;
   const Eigen::Vector2d noise(std::pow(fit.translation.across, 2), std::pow(fit.rotation, 2));
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(noise[0]), Eigen::Vector3d::Constant(noise[1]);
@@ -69,10 +69,13 @@ std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
     mode.rotation = as_errors.rightCols<3>();
   }
   const ArmErrorFit arm = fit_arm_errors(modes, seen, prior, noise);
-  // In place of the independent scatter stands, by its share, what was found.
-  const Eigen::MatrixXd moved_by = information.ldlt().solve(gains),
-                        instead = moved_by * arm.covariance * moved_by.transpose();
+  // In place of the independent scatter stands, by its share, what was found, and what the prior of the size
+  // leaves.
   const double rest = 1 - arm.errors.share;
+  const Eigen::LDLT<Eigen::MatrixXd> solution(information);
+  const Eigen::MatrixXd moved_by = solution.solve(gains);
+  Eigen::MatrixXd instead = moved_by * arm.covariance * moved_by.transpose();
+  instead += arm.errors.share * solution.solve(solution.solve(prior.topLeftCorner(s, s)).transpose());
   SmoothErrorsOfPairs result{arm.errors, rest * scatter.covariance + instead.topLeftCorner<6, 6>()};
   if (s > poses) result.size_sd = std::sqrt(rest * std::pow(scatter.size_sd, 2) + instead(poses, poses));
   return result;

@@ -36,7 +36,15 @@ inline ArmModel described_arm(const Eigen::VectorXd& lengths, double length_sd) 
 /// What the recording's readers know of the arm.
 enum class Known { poses, joints, joints_and_lengths };
 
-/// A recording of 25 views by an arm that repeats to 0.005 deg and 0.03 mm and is not as described.
+/// Of an arm that repeats to 0.005 deg and 0.03 mm.
+inline Vector6d robot_noise(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  Vector6d noise;
+  for (Eigen::Index k = 0; k < 6; ++k) noise[k] = (k < 3 ? 3e-5 : 0.005 * M_PI / 180) * normal(random);
+  return noise;
+}
+
+/// A recording of 25 views by such an arm, which is not as described.
 inline HandEyeScene recorded(const WrongArm& wrong, Known known, unsigned seed,
                              Setup setup = Setup::eye_in_hand, double length_sd = kUsualLinkLength,
                              double reach = 0.4) {
@@ -46,13 +54,10 @@ inline HandEyeScene recorded(const WrongArm& wrong, Known known, unsigned seed,
   ArmModel arm = described_arm(wrong.lengths, length_sd);
   if (known == Known::joints_and_lengths) arm.lengths = link_lengths(arm.chain);
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < scene.observations.size(); ++i) {
     const Eigen::VectorXd said = scene.joints[i] - wrong.zeros;
-    Vector6d noise;
-    for (Eigen::Index k = 0; k < 6; ++k) noise[k] = (k < 3 ? 3e-5 : 0.005 * M_PI / 180) * normal(random);
     Observation& observation = scene.observations[i];
-    observation.T_base_gripper = moved(gripper_pose(arm.chain, said), noise);
+    observation.T_base_gripper = moved(gripper_pose(arm.chain, said), robot_noise(random));
     if (known == Known::poses) continue;
     observation.joint_motions = error_motions(arm, said);
     observation.joint_sd = prior_deviations(arm);

@@ -147,7 +147,8 @@ def check(calib, work, tool):
     usual = json.loads(program.must(calib, *given, "--link-lengths", "usual", "--json").stdout)
     yield usual["link_lengths"]["prior_sd_mm"] == 0.3, "usual is not 0.3 mm"
     zeros_alone = json.loads(program.must(calib, *given, "-o", work / "zeros.json", "--json").stdout)
-    yield zeros_alone["link_lengths"] is None and len(zeros_alone["joint_origins"]) == 6, "lengths without --link-lengths"
+    origins = [origin["joint"] for origin in zeros_alone["joint_origins"]]
+    yield zeros_alone["link_lengths"] is None and origins == [*AXES, "flange"], f"lengths without --link-lengths, or origins of {origins} alone"
     yield from refused(calib, work, given, into, file, robot)
 
 

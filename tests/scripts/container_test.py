@@ -72,11 +72,15 @@ def packages_complaints(programs):
 def entry_complaints():
     def run(*words):
         return subprocess.run(["sh", ROOT / "scripts/container-entry", *words], capture_output=True, text=True)
-    silent, unknown, program = run(), run("flash-clib"), run("sh", "-c", "exit 3")
-    if silent.returncode or "flash-calib" not in silent.stdout:
-        yield f"without words: {silent}"
-    if unknown.returncode != 2 or unknown.stderr.count("\n") != 1 or "flash-clib" not in unknown.stderr:
-        yield f"of an unknown program: {unknown}"
+    for words in ((), ("--help",)):
+        help_text = run(*words)
+        if help_text.returncode or "flash-calib" not in help_text.stdout or help_text.stderr:
+            yield f"of {words}: {help_text}"
+    for word in ("flash-clib", "cd", "if", "/", "-c", ""):
+        unknown = run(word)
+        if unknown.returncode != 2 or unknown.stderr.count("\n") != 1 or f"{word}: no such program" not in unknown.stderr:
+            yield f"of no program: {unknown}"
+    program = run("sh", "-c", "exit 3")
     if program.returncode != 3:
         yield f"the exit code of a program is not passed on: {program}"
 

@@ -8,7 +8,7 @@ difference: that of the paired difference of squares over parts or splits, over 
 than two of them is marked. Halves are of recorded sets with 16 views or more.
 
     tests/validation/handeye_methods.py --program build/release/bin/flash-calib ../shared/data/handeye
-    build/release/tests/drawn_cells /tmp/cells 40 8100001 1; tests/validation/handeye_methods.py --drawn /tmp/cells"""
+    build/release/tests/drawn_cells cells 40 8100001 1; tests/validation/handeye_methods.py --drawn cells"""
 import argparse
 import json
 import math

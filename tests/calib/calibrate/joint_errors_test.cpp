@@ -111,6 +111,42 @@ TEST(JointErrors, LengthsAreFoundBesideZeros) {
   EXPECT_GE(told_inside, 0.9 * told);
 }
 
+/// Another recording in the same poses, with noise of its own.
+HandEyeScene recorded_again(HandEyeScene scene, const WrongArm& wrong, unsigned seed) {
+  const SerialChain described = described_arm(wrong.lengths, kUsualLinkLength).chain;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < scene.observations.size(); ++i) {
+    Observation& view = scene.observations[i];
+    const Eigen::Isometry3d T = scene.truth.X.inverse() * scene.true_poses[i].inverse() * scene.truth.Z;
+    for (Eigen::Index k = 0; k < scene.points.cols(); ++k)
+      view.pixels.col(k) = project(to_vector(scene.camera), T * scene.points.col(k)) +
+                           scene.settings.corner_px * Eigen::Vector2d(normal(random), normal(random));
+    view.T_camera_target = {fitted_pose(scene.camera, scene.points, view.pixels, T)};
+    view.T_base_gripper = moved(gripper_pose(described, scene.joints[i] - wrong.zeros), robot_noise(random));
+  }
+  return scene;
+}
+
+// What is not told of an arm is the same in another recording of it.
+TEST(JointErrors, AnotherRecordingOfTheArmDiffersByWhatIsRepeatable) {
+  constexpr unsigned kPairs = 6;
+  constexpr double kLengthSd = 0.5e-3;
+  double squares = 0, stated = 0;
+  for (unsigned pair = 0; pair < kPairs; ++pair) {
+    const WrongArm wrong = draw_wrong_arm(1400 + pair, kLengthSd);
+    const HandEyeScene scene =
+        recorded(wrong, Known::joints_and_lengths, 1400 + pair, Setup::eye_in_hand, kLengthSd);
+    const Calibration one = calibrated(scene), other = calibrated(recorded_again(scene, wrong, 1500 + pair));
+    const Vector6d apart = motion_between(one.poses.X, other.poses.X);
+    squares += apart.dot((one.repeatable + other.repeatable).ldlt().solve(apart));
+    stated += apart.dot((one.covariance + other.covariance).ldlt().solve(apart));
+  }
+  EXPECT_GT(squares, 15.3);  // 36 degrees of freedom, 99.9 % band
+  EXPECT_LT(squares, 68);
+  EXPECT_LT(stated, 0.5 * squares);
+}
+
 TEST(JointErrors, LengthsThatAreRightStayZero) {
   constexpr unsigned kTrials = 8;
   int claimed = 0, told = 0;

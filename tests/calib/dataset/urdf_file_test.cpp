@@ -4,6 +4,7 @@
 
 #include "calib/dataset/joint_list.h"
 #include "calib/geometry/pose.h"
+#include "calib/report/robot_file.h"
 #include "data/files/error.h"
 #include "tests/data/temporary_folder.h"
 
@@ -75,6 +76,20 @@ TEST_F(Urdf, WhatIsNoChainIsNamed) {
             std::string::npos);
   EXPECT_NE(data::input_error_of([&] { load_urdf(write("b.urdf", "<model/>")); }).find("no element robot"),
             std::string::npos);
+}
+
+TEST_F(Urdf, CamerasThatWereExportedIntoItAreNoEndsOfTheArm) {
+  std::string arm = kArm;
+  const std::string mount =
+      R"(  <joint name="mount" type="fixed"><parent link="fore"/><child link="eye"/></joint>)";
+  arm.erase(arm.find(mount), mount.size());
+  const std::size_t links = load_urdf(write("arm.urdf", arm)).joints.size();
+  for (const std::string& carrier : {"tool", "base"})
+    arm = camera_in_urdf(arm, "arm.urdf",
+                         {.parent = carrier, .child = carrier + "_camera", .T = shifted(0, 0.1, 0)});
+  const std::string path = write("seen.urdf", arm);
+  EXPECT_EQ(load_urdf(path).joints.size(), links);
+  EXPECT_EQ(load_urdf(path, "", "tool_camera").joints.size(), links + 1);
 }
 
 TEST_F(Urdf, JointsBesideTheChainMayBeOfAnyKind) {

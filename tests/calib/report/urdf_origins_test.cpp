@@ -72,6 +72,27 @@ TEST_F(UrdfOrigins, NothingElseChanges) {
   EXPECT_EQ(is, was);
 }
 
+TEST_F(UrdfOrigins, AreTheJointsOwnWhereOtherElementsHaveSomeToo) {
+  const std::string own = "<origin xyz=\"0.5 0 0\">",
+                    other = "<safety><origin xyz=\"4 4 4\"/></safety><origin_of xyz=\"5 5 5\"/>";
+  std::string arm = kArm;
+  arm.insert(arm.find(own), other);
+  const std::string text = with_joint_origins(arm, "arm.urdf", origins_);
+  EXPECT_NE(text.find(other), std::string::npos) << text;
+  EXPECT_EQ(text.find(own), std::string::npos) << text;
+}
+
+TEST_F(UrdfOrigins, FixedJointsOfAnotherRobotAreRefused) {
+  arm_.lengths.clear();
+  origins_ = joint_origins(arm_, errors_.head<3>());
+  std::string other = kArm;
+  other.replace(other.find("0.1 0 0\" rpy"), 7, "0.2 0 0");
+  EXPECT_NE(data::input_error_of([&] {
+              with_joint_origins(other, "arm.urdf", origins_);
+            }).find("joint flange: found origin 0.2 0 0"),
+            std::string::npos);
+}
+
 TEST_F(UrdfOrigins, OfAnotherRobotAreRefused) {
   const auto refusal = [&](std::string text, const std::string& from, const std::string& to) {
     text.replace(text.find(from), from.size(), to);
@@ -83,6 +104,16 @@ TEST_F(UrdfOrigins, OfAnotherRobotAreRefused) {
             std::string::npos);
   EXPECT_NE(refusal(kArm, "0 0 0.3", "0 0 0.4").find("joint shoulder: found origin 0 0 0.4"),
             std::string::npos);
+  // What moves the chain without a change of an origin that errors are in.
+  const auto expect_refusal = [&](const char* from, const char* to, const char* words) {
+    EXPECT_NE(refusal(kArm, from, to).find(words), std::string::npos) << refusal(kArm, from, to);
+  };
+  expect_refusal("type=\"continuous\"", "type=\"prismatic\"",
+                 "joint elbow: found a prismatic joint, expected a revolute one");
+  expect_refusal("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 1\"/>",
+                 "joint elbow: found axis 0 0 1, expected 0 1 0");
+  expect_refusal("<parent link=\"fore\"/>", "<parent link=\"upper\"/>",
+                 "joint wrist: found parent upper, expected fore");
   EXPECT_NE(refusal(kArm, "0 0 0.3", "0 0 ${h}").find("expected numbers"), std::string::npos);
   EXPECT_NE(refusal(kArm, "</robot>", "").find("is no XML"), std::string::npos);
 }
