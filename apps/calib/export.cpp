@@ -15,6 +15,7 @@
 #include "calib/report/urdf_origins.h"
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
+#include "data/files/folder_lock.h"
 #include "data/files/json_reader.h"
 #include "data/files/writable.h"
 
@@ -66,7 +67,9 @@ std::vector<std::string> not_expressed(const ExportOptions& options, const calib
 
 // What a link leads to, which is changed in its place.
 std::string file_to_change(const std::string& path) {
-  const fs::path file = fs::canonical(path);
+  std::error_code missing;
+  const fs::path file = fs::canonical(path, missing);
+  if (missing) throw data::InputError(path + ": cannot be read: " + missing.message());
   const bool writable = (fs::status(file).permissions() & fs::perms::owner_write) != fs::perms::none;
   if (!fs::is_regular_file(file) || !writable)
     throw data::InputError(path + ": cannot be changed, expected a file that may be written to");
@@ -115,8 +118,9 @@ int run_export(const ExportOptions& options) {
 
   std::string backup;
   if (changes) {
-    const std::string was = data::read_file(options.into);
     const std::string file = file_to_change(options.into);
+    const data::FolderLock lock(file);  // of two at once, one waits
+    const std::string was = data::read_file(options.into);
     const std::string is = changed(was, options, extrinsics);
     backup = backup_path(file);
     const fs::perms permissions = fs::status(file).permissions();

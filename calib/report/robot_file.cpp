@@ -28,8 +28,10 @@ std::string without_camera(std::string text, const std::string& path, const std:
   if (begin == std::string::npos || end == std::string::npos || end < begin)
     throw input_error(path, camera,
                       "found one of the comments \"" + first + "\" and \"" + last + "\", expected both");
-  const std::size_t line = text.rfind('\n', begin), after = end + last.size();
-  return text.erase(line == std::string::npos ? 0 : line, after - (line == std::string::npos ? 0 : line));
+  std::size_t line = text.rfind('\n', begin);
+  if (line == std::string::npos) line = 0;
+  if (line > 0 && text[line - 1] == '\r') --line;
+  return text.erase(line, end + last.size() - line);
 }
 
 std::string name_of(const tinyxml2::XMLElement& element) {
@@ -59,12 +61,14 @@ std::string listed(const std::vector<std::string>& names) {
   return names.size() > kMost ? text + ", ..." : text;
 }
 
-/// Each line of `block` between the marks, moved in.
-std::string marked(const std::string& block, const std::string& camera, const std::string& indent) {
-  std::string text = "\n" + indent + first_mark(camera);
+/// Each line of `block` between the marks, moved in; lines end as those of the robot do.
+std::string marked(const std::string& block, const std::string& camera, const std::string& indent,
+                   const std::string& robot) {
+  const std::string begin = (robot.find("\r\n") == std::string::npos ? "\n" : "\r\n") + indent;
+  std::string text = begin + first_mark(camera);
   std::istringstream lines(block);
-  for (std::string line; std::getline(lines, line);) text += "\n" + indent + line;
-  return text + "\n" + indent + last_mark(camera);
+  for (std::string line; std::getline(lines, line);) text += begin + line;
+  return text + begin + last_mark(camera);
 }
 
 /// Throws where several elements of the kind have a name.
@@ -165,7 +169,7 @@ std::string camera_in_urdf(const std::string& text, const std::string& path,
     throw data::InputError(path + ": found a robot without links, expected </robot> at its end");
   const std::string block = "<link name=\"" + transform.child + "\"/>\n" + urdf_joint(transform, lens);
   const std::size_t last = robot.find_last_not_of(" \t\r\n", end - 1);
-  return robot.insert(last + 1, marked(block, transform.child, "  "));
+  return robot.insert(last + 1, marked(block, transform.child, "  ", robot));
 }
 
 std::string camera_in_mjcf(const std::string& text, const std::string& path,
@@ -192,7 +196,7 @@ std::string camera_in_mjcf(const std::string& text, const std::string& path,
                       "found none with an end of its own, expected <body ...> ... </body>");
   const std::size_t line = robot.rfind('\n', place), first = robot.find_first_not_of(" \t", line + 1);
   const std::string indent(first - (line + 1) + 2, ' ');
-  return robot.insert(place, marked(mjcf_camera(transform, lens), transform.child, indent));
+  return robot.insert(place, marked(mjcf_camera(transform, lens), transform.child, indent, robot));
 }
 
 }  // namespace flash::calib

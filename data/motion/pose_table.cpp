@@ -159,7 +159,12 @@ PoseList read_pose_table(const std::string& path, const std::function<void(const
     std::vector<std::string> cells;
     for (const std::string_view cell : split(line, separator)) cells.push_back(trimmed(cell));
     if (columns.empty()) {
-      for (std::size_t c = 0; c < cells.size(); ++c) columns[column_name(cells[c])] = c;
+      for (std::size_t c = 0; c < cells.size(); ++c)
+        if (const auto [first, is_new] = columns.emplace(column_name(cells[c]), c);
+            !is_new && !cells[c].empty())
+          throw input_error(path, "header",
+                            "found " + first->first + " as column " + std::to_string(first->second + 1) +
+                                " and as column " + std::to_string(c + 1) + ", expected it once");
       check(columns);
       continue;
     }

@@ -167,7 +167,7 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
           });
       warnings.push_back(summary.recordings[r].name + ": " +
                          at_bound_text(parameter, replays[r].recording.nuisance) + " (the estimate and " +
-                         std::to_string(count) + " of all " + std::to_string(candidates.size()) +
+                         std::to_string(count) + " of " + std::to_string(candidates.size()) +
                          " candidates end at it)");
     }
   // A few millimetres are what a table's height is known to.

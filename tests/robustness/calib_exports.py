@@ -6,6 +6,7 @@ import json
 import math
 import pathlib
 import re
+import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as xml
@@ -156,6 +157,18 @@ def odd_files(calib, work, truth):
     yield carrier.find("camera") is not None, "mjcf: the camera is in another body"
 
 
+def at_once(calib, work, truth):
+    """Exports into one file at the same time lose no camera, and what one of them kept is what stood there."""
+    robot, cameras = work / "shared.urdf", [f"eye_{k}" for k in range(8)]
+    robot.write_text(ROBOT)
+    calls = [subprocess.Popen([calib, "export", truth["file"], "--to", "urdf", "--into", robot, "--parent-frame", "tool0", "--child-frame", camera],
+                              stdout=subprocess.DEVNULL) for camera in cameras]
+    yield all(call.wait() == 0 for call in calls), "urdf: exports at once fail"
+    found = [link.get("name") for link in xml.fromstring(robot.read_text()).iter("link")]
+    yield sorted(found) == sorted(["base", "tool0", *cameras]), f"urdf: of {len(cameras)} exports at once {found} are left"
+    yield len(list(work.glob("shared.urdf.bak*"))) == len(cameras), "urdf: exports at once share a backup"
+
+
 def refused(calib, work, truth):
     robot, model = work / "other.urdf", work / "other.xml"
     robot.write_text(ROBOT)
@@ -208,7 +221,7 @@ def main():
         transform = answer["transform"]
         truth = {"file": file, "t": transform["translation"], "R": program.rotation_of(transform["rotation_xyzw"]), "lens": answer["lens"],
                  "parent": transform["parent"]}
-        results = [row for check in (of_urdf, of_mjcf, of_usd, odd_files, refused) for row in check(options.calib, work, truth)]
+        results = [row for check in (of_urdf, of_mjcf, of_usd, odd_files, at_once, refused) for row in check(options.calib, work, truth)]
         for kind in ("tf", "easy_handeye2", "opencv"):
             done = program.must(options.calib, "export", file, "--to", kind, "-o", work / kind, "--json")
             results.append((json.loads(done.stdout)["file"] == str(work / kind) and (work / kind).exists(), f"{kind}: not written"))

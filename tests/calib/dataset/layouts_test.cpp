@@ -7,6 +7,7 @@
 #include "data/camera/extrinsics.h"
 #include "data/camera/intrinsics_file.h"
 #include "data/files/error.h"
+#include "data/motion/pose_table.h"
 #include "data/motion/trajectory.h"
 #include "data/picture/picture.h"
 #include "tests/data/npz_text.h"
@@ -359,6 +360,15 @@ TEST(Layouts, MatricesThatAreNoRotationAreRefusedWithTheNumber) {
   EXPECT_NE(said("-1,0,0,0,0,1,0,0,0,0,1,0").find("mirrors"), std::string::npos);
   EXPECT_NE(said("1,0.1,0,0,0,0.994987,0,0,0,0,1,0").find("have the product 0.1"), std::string::npos)
       << said("1,0.1,0,0,0,0.994987,0,0,0,0,1,0");
+}
+
+TEST(Layouts, AColumnThatStandsTwiceIsRefused) {
+  const data::TemporaryFolder folder;
+  const std::string path =
+      folder.write("poses.csv", "index,x,y,z,qx,qy,qz,qw,tx\n0,0,0,0,0,0,0,1,0.5\n1,0,0,0,0,0,0,1,0.5\n");
+  EXPECT_NE(
+      data::input_error_of([&] { data::load_pose_table(path); }).find("found tx as column 2 and as column 9"),
+      std::string::npos);
 }
 
 TEST(Layouts, NumbersThatAreNoPoseAreNamed) {

@@ -84,7 +84,7 @@ TEST_F(Urdf, CamerasThatWereExportedIntoItAreNoEndsOfTheArm) {
       R"(  <joint name="mount" type="fixed"><parent link="fore"/><child link="eye"/></joint>)";
   arm.erase(arm.find(mount), mount.size());
   const std::size_t links = load_urdf(write("arm.urdf", arm)).joints.size();
-  for (const std::string& carrier : {"tool", "base"})
+  for (const std::string carrier : {"tool", "base"})
     arm = camera_in_urdf(arm, "arm.urdf",
                          {.parent = carrier, .child = carrier + "_camera", .T = shifted(0, 0.1, 0)});
   const std::string path = write("seen.urdf", arm);

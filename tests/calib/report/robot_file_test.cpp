@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
@@ -36,6 +38,13 @@ TEST(RobotFile, OfMjcfTheBodyOfTheNameTakesTheCamera) {
 }
 
 // Two cameras that carry each other are no tree.
+TEST(RobotFile, LinesEndAsThoseOfTheRobot) {
+  const std::string robot = "<robot>\r\n  <link name='tool0'/>\r\n</robot>\r\n";
+  const std::string once = camera_in_urdf(robot, "r.urdf", transform);
+  EXPECT_EQ(std::count(once.begin(), once.end(), '\r'), std::count(once.begin(), once.end(), '\n'));
+  EXPECT_EQ(camera_in_urdf(once, "r.urdf", transform), once);
+}
+
 TEST(RobotFile, ACameraDoesNotCarryItself) {
   const std::string robot = "<robot><link name='tool0'/></robot>";
   data::NamedTransform eye = transform, other = transform;
