@@ -1,7 +1,8 @@
 // What --for serves, over seeded scenes: robots whose poses are noisy, and arms whose kinematic model is
 // wrong. image: held-out pixels and stated uncertainty; two-arms: two arms on one camera, against the truth;
 // the lens is not quite as stated, and each arm has a print known to 0.3 %; and what a joint solution of both
-// states. SCENES FIRST_SEED [jointly]
+// states.
+// SCENES FIRST_SEED [jointly [wrong-kinematics]]
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdio>
@@ -189,7 +190,9 @@ int main(int argc, char** argv) {
   const unsigned first_seed = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 600001;
   const bool jointly = argc > 3 && std::string(argv[3]) == "jointly";  // that alone
   using flash::calib::Setup;
+  const bool wrong_alone = argc > 4 && std::string(argv[4]) == "wrong-kinematics";
   for (const bool wrong_kinematics : {false, true}) {
+    if (wrong_alone && !wrong_kinematics) continue;
     for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand})
       if (!jointly) flash::calib::study_image(setup, wrong_kinematics, scenes, first_seed);
     for (const double lens_sd : {0.0, 0.002, 0.005}) {
