@@ -13,9 +13,13 @@ namespace flash::calib {
 namespace {
 
 constexpr int kOwn = PoseModes::kOwn, kModes = PoseModes::kSmooth;
-constexpr double kReaches[] = {0.5, 1, 2, 4, 8};  // of the rms distance between two poses
-// Turns [rad], a factor of two apart: 0.006 to 0.4 deg.
-constexpr double kSizes[] = {1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3};
+// Of the rms distance between two poses, and how likely each is of drawn arms (make arm-errors).
+struct Reach {
+  double length, probability;
+};
+constexpr Reach kReaches[] = {{1, 0.05}, {2, 0.2}, {4, 0.4}, {8, 0.35}};
+// Turns [rad], a factor of two apart: 0.01 to 0.7 deg.
+constexpr double kSizes[] = {2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 1.28e-2};
 constexpr double kUsualSize = 0.1 * M_PI / 180, kSizeSpread = 1;  // of its logarithm
 // Of errors that are smooth against errors that are not, before any view is seen: arms repeat to a tenth of
 // their accuracy (ISO 9283 states both), so that nearly every one has them.
@@ -199,7 +203,7 @@ std::vector<Candidate> candidates(const std::vector<PoseModes>& modes, const See
   const double independent = fit_variances(seen.beta, I, M, unit).deviance;
   const Eigen::MatrixXd squared = squared_distances(modes, noise.translation2, noise.rotation2);
   std::vector<Candidate> list;
-  for (const double reach : kReaches) {
+  for (const auto& [reach, probability] : kReaches) {
     const Eigen::MatrixXd k = matern(squared, reach);
     Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(n, n);
     for (std::size_t mode = 0; mode < kModes; ++mode)
@@ -210,14 +214,15 @@ std::vector<Candidate> candidates(const std::vector<PoseModes>& modes, const See
       candidate.fit = fit_variances(seen.beta, I + size * size * fields, M, unit);
       errors.gain = std::max(errors.gain, independent - candidate.fit.deviance);
       const double unusual = std::log(size / kUsualSize) / kSizeSpread;
-      candidate.weight = 0.5 * (independent - candidate.fit.deviance - unusual * unusual);
+      candidate.weight =
+          std::log(probability) + 0.5 * (independent - candidate.fit.deviance - unusual * unusual);
     }
   }
   double largest = 0;
   for (const Candidate& candidate : list) largest = std::max(largest, candidate.weight);
   double prior = 0, sum = std::exp(-largest);
   for (const double size : kSizes)
-    prior += std::size(kReaches) * std::exp(-0.5 * std::pow(std::log(size / kUsualSize) / kSizeSpread, 2));
+    prior += std::exp(-0.5 * std::pow(std::log(size / kUsualSize) / kSizeSpread, 2));
   for (Candidate& candidate : list)
     sum += candidate.weight = kOdds / prior * std::exp(candidate.weight - largest);
   for (Candidate& candidate : list) candidate.weight /= sum;
@@ -233,7 +238,7 @@ Eigen::MatrixXd field_covariance(const std::vector<PoseModes>& modes, const std:
   Eigen::Vector2d independent = Eigen::Vector2d::Zero();
   Eigen::MatrixXd k = Eigen::MatrixXd::Zero(n, n);  // times the squares of the sizes
   double squares = 0;
-  for (const double reach : kReaches) {
+  for (const auto& [reach, probability] : kReaches) {
     double size2 = 0;
     for (const Candidate& candidate : list) {
       if (candidate.reach != reach) continue;

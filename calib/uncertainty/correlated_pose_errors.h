@@ -42,8 +42,8 @@ ArmErrorFit fit_arm_errors(const std::vector<PoseModes>& modes, const std::vecto
 /// Beside the independent errors of each arm stand Gaussian random fields over place and attitude (Matern
 /// 5/2; Rasmussen and Williams 2006) of one size, in all ways in which a wrong kinematic model moves a
 /// gripper: it is turned at the wrist, turned about the base, shifted in either's axes, and the arm is
-/// stretched. Each size and reach has the weight of its restricted likelihood times that of the size among
-/// arms in use, log-normal about 0.1 deg.
+/// stretched. Each size and reach has the weight of its restricted likelihood times what it has among arms in
+/// use: sizes log-normal about 0.1 deg, reaches as errors of zeros, links, axes and gears have them.
 /// Where the zeros of joints are unknowns, they stand for all that.
 PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& settings);
 
