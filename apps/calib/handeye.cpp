@@ -135,15 +135,6 @@ void print_lens(const calib::Calibration& c) {
         1e3 * shift.head<3>().norm(), shift.tail<3>().norm() * 180 / M_PI);
 }
 
-/// "x", or the three numbers.
-std::string direction_name(const Eigen::Vector3d& direction) {
-  constexpr double kAlong = 0.9999;
-  for (Eigen::Index i = 0; i < 3; ++i)
-    if (direction[i] > kAlong) return std::string(1, "xyz"[i]);
-  return "(" + fixed(direction.x(), 2) + ", " + fixed(direction.y(), 2) + ", " + fixed(direction.z(), 2) +
-         ")";
-}
-
 /// Each error of the arm's joints, with its interval.
 void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   const auto errors = calib::joint_errors(c.refined.bundle, c.unknowns, c.shared_covariance);
@@ -170,8 +161,8 @@ void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsi
   }
   std::printf("origins of joints are farther than the URDF says by, likewise:\n");
   for (const calib::LinkLength& length : arm.lengths)
-    line(arm.chain.joints[length.joint].name + " along " + direction_name(length.direction), next++, 1e3,
-         "mm");
+    line(arm.chain.joints[length.joint].name + " along " + calib::direction_name(length.direction), next++,
+         1e3, "mm");
 }
 
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {

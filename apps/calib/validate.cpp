@@ -258,7 +258,7 @@ int run_touched(const ValidateOptions& options) {
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::TouchCheck found = calib::check_touched(
       extrinsics, calib::load_touched_points(options.touched), options.touch, options.touched);
-  const int exit_code = found.contradicts || !extrinsics.usable ? exit_unusable : exit_done;
+  const int exit_code = found.contradicts || !found.judges || !extrinsics.usable ? exit_unusable : exit_done;
   nlohmann::ordered_json json = {{"schema", "flash-touched/1"},
                                  {"extrinsics", options.extrinsics},
                                  {"touched", options.touched},
@@ -267,7 +267,9 @@ int run_touched(const ValidateOptions& options) {
                                  {"expected_across_mm", 1e3 * found.expected_across},
                                  {"chi_square", found.chi_square},
                                  {"chance", found.chance},
+                                 {"shift_chance", found.shift_chance},
                                  {"contradicts", found.contradicts},
+                                 {"judges", found.judges},
                                  {"points", nlohmann::ordered_json::array()},
                                  {"exit_code", exit_code}};
   for (int axis = 0; axis < 3; ++axis) {
@@ -289,6 +291,11 @@ int run_touched(const ValidateOptions& options) {
   }
   if (found.contradicts)
     say_unusable(calib::describe(found), "the touched points contradict the calibration");
+  else if (!found.judges)
+    say_unusable("the touched points tell the camera's place to no better than " +
+                     data::format_short(1e3 * found.shift_sd.maxCoeff()) +
+                     " mm: touch six or more, spread over the workspace and its heights",
+                 "they cannot judge the calibration");
   else if (!extrinsics.usable)
     say_unusable(options.extrinsics + ": it ended with exit code 3", "the calibration cannot be used");
   return exit_code;

@@ -8,6 +8,7 @@
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/linearization.h"
 #include "calib/uncertainty/corner_noise_ratios.h"
+#include "calib/uncertainty/joint_errors.h"
 #include "data/files/error.h"
 
 namespace flash::calib {
@@ -240,6 +241,11 @@ ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Tar
     if (!detections[i].reason.empty()) best.calibration.views[i].reason = detections[i].reason;
   if (dataset.stream && !timed) check_time(dataset, settings, best.calibration);
   if (depth) report_depth(depth->use, best);
+  const Calibration& answer = best.calibration;
+  const auto errors = joint_errors(answer.refined.bundle, answer.unknowns, answer.shared_covariance);
+  if (errors && dataset.arm)
+    for (std::string& sentence : joints_far_off(*errors, *dataset.arm))
+      best.calibration.warnings.push_back(std::move(sentence));
   return best;
 }
 

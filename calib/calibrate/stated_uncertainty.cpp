@@ -20,9 +20,9 @@ Matrix6d without_joint_priors(const Matrix6d& of_X, const Refinement& refined, c
   Matrix6d scatter = of_X;
   for (std::size_t arm = 0; arm < columns.joint_errors.size(); ++arm) {
     if (columns.joint_errors[arm] < 0) continue;
-    const Eigen::VectorXd& sd = refined.bundle.joint_error_sd[arm];
-    const Eigen::MatrixXd C = refined.covariance.block(0, columns.joint_errors[arm], 6, sd.size());
-    scatter -= C * sd.cwiseAbs2().cwiseInverse().asDiagonal() * C.transpose();
+    const Eigen::VectorXd weights = joint_error_weights(refined.bundle, arm);
+    const Eigen::MatrixXd C = refined.covariance.block(0, columns.joint_errors[arm], 6, weights.size());
+    scatter -= C * weights.asDiagonal() * C.transpose();
   }
   // Noise levels are uncertain themselves, which widens C: nothing need be left of a direction.
   constexpr double kLeast = 1e-4;

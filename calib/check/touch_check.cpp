@@ -1,6 +1,8 @@
 #include "calib/check/touch_check.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -118,8 +120,11 @@ TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<Touched
   const Eigen::LDLT<Eigen::MatrixXd> all(noise + by_pose * extrinsics.covariance * by_pose.transpose());
   check.chi_square = errors.dot(all.solve(errors));
   check.chance = chance_beyond(check.chi_square, 2 * static_cast<int>(count));
-  constexpr double kContradicts = 0.01;
-  check.contradicts = check.chance < kContradicts;
+  const Eigen::Vector3d score = by_shift.transpose() * all.solve(errors);
+  const Eigen::Matrix3d scatter = by_shift.transpose() * all.solve(by_shift);
+  check.shift_chance = chance_beyond(score.dot(scatter.completeOrthogonalDecomposition().solve(score)), 3);
+  constexpr double kContradicts = 0.01;  // shared by both
+  check.contradicts = std::min(check.chance, check.shift_chance) < 0.5 * kContradicts;
   // By the points alone: one of them says nothing along its ray, of which the range of depths is the prior.
   const Eigen::LDLT<Eigen::MatrixXd> alone(noise);
   const Eigen::Matrix3d information =
@@ -127,6 +132,8 @@ TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<Touched
   const Eigen::Matrix3d covariance = information.inverse();
   check.shift = covariance * (by_shift.transpose() * alone.solve(errors));
   check.shift_sd = covariance.diagonal().cwiseSqrt();
+  constexpr double kTold = 10;  // touches
+  check.judges = check.shift_sd.maxCoeff() < kTold * settings.touch_sd;
   return check;
 }
 
@@ -135,12 +142,11 @@ std::string describe(const TouchCheck& check) {
   std::snprintf(
       text, sizeof text,
       "the touched points are missed by %.2f mm across the line of sight (%.2f px) where about %.2f mm are "
-      "expected; a right calibration would miss them by more with a chance of %s; they fit best with "
-      "the "
-      "camera moved by (%.1f, %.1f, %.1f) +- (%.1f, %.1f, %.1f) mm",
+      "expected; a right calibration would miss them by more with a chance of %s; they fit best with the "
+      "camera moved by (%.1f, %.1f, %.1f) +- (%.1f, %.1f, %.1f) mm, and by more with a chance of %s",
       1e3 * check.rms_across, check.rms_px, 1e3 * check.expected_across, chance_text(check.chance).c_str(),
       1e3 * check.shift.x(), 1e3 * check.shift.y(), 1e3 * check.shift.z(), 1e3 * check.shift_sd.x(),
-      1e3 * check.shift_sd.y(), 1e3 * check.shift_sd.z());
+      1e3 * check.shift_sd.y(), 1e3 * check.shift_sd.z(), chance_text(check.shift_chance).c_str());
   return text;
 }
 

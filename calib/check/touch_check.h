@@ -35,7 +35,9 @@ struct TouchCheck {
   Eigen::Vector3d shift_sd = Eigen::Vector3d::Zero();  ///< of that, by the points alone [m]
   double chi_square = 0;                               ///< of all errors, two a point
   double chance = 1;         ///< that a right calibration would miss the points by more
-  bool contradicts = false;  ///< the chance is below 1 %
+  double shift_chance = 1;   ///< that one would be missed by more in the way in which a shift does it
+  bool contradicts = false;  ///< one of the chances is below 0.5 %: of both together 1 %
+  bool judges = false;       ///< the shift is known to ten times the deviation of a touch, in each axis
 };
 
 /// Residuals of places in the pictures of a camera beside the robot, against
@@ -43,8 +45,9 @@ struct TouchCheck {
 ///     S = J C J^T + diag(P touch_sd^2 P^T + pixel_sd^2 I),
 ///
 /// C the covariance of the calibration, which all points share, J and P the derivatives of a pixel by the
-/// camera's pose and by the place. The distance across the ray is at the depth of the place. Throws
-/// data::InputError where the camera is on the gripper, has no lens, or a place lies behind it.
+/// camera's pose and by the place. The shift is judged by its score, of three degrees of freedom: many points
+/// hide it in the sum of all errors (Rao 1948). The distance across the ray is at the depth of the place.
+/// Throws data::InputError where the camera is on the gripper, has no lens, or a place lies behind it.
 TouchCheck check_touched(const Extrinsics& extrinsics, const std::vector<TouchedPoint>& points,
                          const TouchSettings& settings, const std::string& path);
 

@@ -98,6 +98,11 @@ Eigen::VectorXd joint_error_sd(const Observation& observation) {
   return Eigen::VectorXd::Constant(observation.joint_motions.cols(), kUsualJointZero);
 }
 
+Eigen::VectorXd joint_error_weights(const Bundle& bundle, std::size_t arm) {
+  const Eigen::ArrayXd sd = bundle.joint_error_sd[arm];
+  return 1 / (sd.square() + bundle.joint_errors[arm].array().square() / kJointErrorTail);
+}
+
 Eigen::Isometry3d usual_correction(const Bundle& bundle, const RobotPose& pose) {
   if (bundle.joint_errors.empty() || pose.joint_motions.cols() == 0) return Eigen::Isometry3d::Identity();
   return moved(Eigen::Isometry3d::Identity(),

@@ -125,6 +125,17 @@ inline double depth_scale(const Bundle& bundle, std::size_t camera) {
 /// Deviations beforehand of the errors of an observation's joints.
 Eigen::VectorXd joint_error_sd(const Observation& observation);
 
+/// What is known of the errors of an arm's joints beforehand, beside r = error / sd of each:
+///
+///     cost = kJointErrorTail log(1 + r^2 / kJointErrorTail),
+///
+/// near zero that of a normal distribution, far out Student's: a joint or a link that is grossly off, or a
+/// description of another arm, is found and does not bend the others.
+constexpr double kJointErrorTail = 4;
+
+/// Of the errors as they are, the inverse variances that this is worth [rad^-2, then m^-2].
+Eigen::VectorXd joint_error_weights(const Bundle& bundle, std::size_t arm);
+
 /// What a pose needs for the errors of its arm's joints, to first order: the mean that its correction
 /// scatters about.
 Eigen::Isometry3d usual_correction(const Bundle& bundle, const RobotPose& pose);

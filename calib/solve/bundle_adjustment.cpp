@@ -381,10 +381,12 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     else
       problem.AddResidualBlock(new EdgePrior, nullptr, offset);
   }
-  for (std::size_t arm = 0; arm < blocks.joint_errors.size(); ++arm)
-    if (problem.HasParameterBlock(blocks.joint_errors[arm].data()))
-      problem.AddResidualBlock(new JointErrorPrior(bundle.joint_error_sd[arm]), nullptr,
-                               blocks.joint_errors[arm].data());
+  for (std::size_t arm = 0; arm < blocks.joint_errors.size(); ++arm) {
+    double* const block = blocks.joint_errors[arm].data();
+    for (Eigen::Index i = 0; problem.HasParameterBlock(block) && i < bundle.joint_error_sd[arm].size(); ++i)
+      problem.AddResidualBlock(new JointErrorPrior(bundle.joint_error_sd[arm], i),
+                               new ceres::CauchyLoss(std::sqrt(kJointErrorTail)), block);
+  }
   if (const std::optional<AlongPrior>& along = bundle.priors.along) {
     double* const block = (along->target ? blocks.targets : blocks.cameras).front().data();
     if (problem.HasParameterBlock(block)) problem.AddResidualBlock(new AlongCost(*along), nullptr, block);

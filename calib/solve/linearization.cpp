@@ -124,8 +124,7 @@ Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns)
   for (std::size_t arm = 0; arm < columns.joint_errors.size(); ++arm) {
     if (columns.joint_errors[arm] < 0) continue;
     const Eigen::VectorXd& errors = bundle.joint_errors[arm];
-    const Eigen::VectorXd weights = bundle.joint_error_sd[arm].cwiseAbs2().cwiseInverse(),
-                          weighted = weights.cwiseProduct(errors);
+    const Eigen::VectorXd weights = joint_error_weights(bundle, arm), weighted = weights.cwiseProduct(errors);
     const Eigen::Index first = columns.joint_errors[arm], count = errors.size();
     gram.diagonal().segment(first, count) += weights;
     gram.col(columns.count).segment(first, count) += weighted;

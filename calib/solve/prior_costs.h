@@ -9,24 +9,26 @@
 
 namespace flash::calib {
 
-/// What is known of the errors of an arm's joints beforehand.
+/// What is known of one of the errors of an arm's joints beforehand, without its loss.
 class JointErrorPrior final : public ceres::CostFunction {
  public:
-  explicit JointErrorPrior(const Eigen::VectorXd& sd) : weights_(sd.cwiseInverse()) {
-    set_num_residuals(static_cast<int>(sd.size()));
-    mutable_parameter_block_sizes()->push_back(num_residuals());
+  JointErrorPrior(const Eigen::VectorXd& sd, Eigen::Index which) : weight_(1 / sd[which]), which_(which) {
+    set_num_residuals(1);
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(sd.size()));
   }
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    const Eigen::Index count = weights_.size();
-    Eigen::Map<Eigen::VectorXd>(residual, count) =
-        weights_.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(x[0], count));
-    if (jacobians && jacobians[0])
-      Eigen::Map<Eigen::MatrixXd>(jacobians[0], count, count) = Eigen::MatrixXd(weights_.asDiagonal());
+    *residual = weight_ * x[0][which_];
+    if (jacobians && jacobians[0]) {
+      Eigen::Map<Eigen::VectorXd> row(jacobians[0], parameter_block_sizes().front());
+      row.setZero();
+      row[which_] = weight_;
+    }
     return true;
   }
 
  private:
-  Eigen::VectorXd weights_;
+  double weight_;
+  Eigen::Index which_;
 };
 
 /// What is known of a target's size beforehand.

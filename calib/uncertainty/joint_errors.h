@@ -1,6 +1,9 @@
 #pragma once
 #include <optional>
+#include <string>
+#include <vector>
 
+#include "calib/geometry/arm_model.h"
 #include "calib/solve/bundle_adjustment.h"
 
 namespace flash::calib {
@@ -18,5 +21,11 @@ struct JointErrors {
 /// covariance: of all shared unknowns. None where no joints are known.
 std::optional<JointErrors> joint_errors(const Bundle& bundle, const Unknowns& unknowns,
                                         const Eigen::MatrixXd& covariance);
+
+/// A sentence of each that is farther off than was to be expected, the farthest first.
+std::vector<std::string> joints_far_off(const JointErrors& errors, const ArmModel& arm);
+
+/// "x", or the three numbers.
+std::string direction_name(const Eigen::Vector3d& direction);
 
 }  // namespace flash::calib

@@ -201,12 +201,34 @@ def test_pictures_that_change_their_size_or_are_not_of_their_lens(refuse):
     ({"distortion_model": "Inverse Brown Conrady", "d": [0.1, 0, 0, 0, 0]}, ("Inverse Brown Conrady",)),
     ({"distortion_model": "plumb_bob", "d": [0.1, 0, 0, 0, 0, 0.2, 0, 0]}, ("8 coefficients", "at most 5")),
     ({"distortion_model": "rational_polynomial", "d": [0.1] * 12}, ("12 coefficients", "expected 8")),
-    ({"k": [0] * 9}, ("focal length of 0",))])
+    ({"k": [0] * 9}, ("focal length of 0",)),
+    ({"d": [0.1, float("nan"), 0, 0, 0]}, ("distortion 0.1, nan", "finite"))])
 def test_lenses_that_are_not_read(refuse, changes, words):
     cell = small(infos=False)
     cell.info(COLOUR_INFO, START, LENS, **changes)
     line = refuse(cell)
     assert COLOUR_INFO in line and all(word in line for word in words), line
+
+
+def test_files_that_hold_no_lens(tmp_path, capsys):
+    source = small(infos=False).write(tmp_path, "mcap")
+    other = tmp_path / "notes.txt"
+    for text in ("root:x:0:0\n", ""):
+        other.write_text(text)
+        assert main([str(source), "-o", str(tmp_path / "out"), "--camera-info", str(other)]) == 2
+        assert "notes.txt" in (line := capsys.readouterr().err) and "found no lens" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_views_are_refused(tmp_path, capsys):
+    assert main([str(small().write(tmp_path, "mcap")), "-o", str(tmp_path / "out"), "--views", "0"]) == 2
+    assert "--views: expected a number above 0" in capsys.readouterr().err
+
+
+def test_files_that_are_not_used_are_told(tmp_path, capsys):
+    source = small().write(tmp_path, "mcap")
+    assert main([str(source), "-o", str(tmp_path / "out"), "--extrinsics", "camera.json"]) == 0
+    assert "--extrinsics camera.json: is not used" in capsys.readouterr().err
 
 
 def test_lenses_that_change_or_are_not_there(refuse):

@@ -73,7 +73,7 @@ def parser():
     p.add_argument("--extrinsics", metavar="FILE", default="", help="where the camera is on the base, copied for segment")
     p.add_argument("--depth-scale", metavar="METRES", type=number(1e-7, 1),
                    help="metres per count of depth, instead of the recording's")
-    p.add_argument("--views", metavar="N", type=int, default=0,
+    p.add_argument("--views", metavar="N", type=int,
                    help="at most N views of handeye, of those where the robot stands still")
     p.add_argument("--every", metavar="SECONDS", type=number(0, 3600),
                    help="take pictures of a moving arm at least this far apart, with the poses over time")
@@ -124,6 +124,8 @@ def convert(recording, settings, said):
     folder = StagedFolder(settings.out, settings.force, read)
     tree = read_transforms(recording)
     stream, topic = _robot(recording, tree, settings, said)
+    if settings.extrinsics and settings.reader != "segment":
+        said.warning(f"--extrinsics {settings.extrinsics}: is not used, since it is for segment")
     colour, depth = choice.choose_pictures(recording.path, choice.survey(recording), settings.topics)
     if settings.reader == "segment" and depth is None:
         cloud = choice.choose_cloud(recording, settings.topics)
@@ -153,6 +155,8 @@ def _robot(recording, tree, settings, said):
     topics = pose_topics(recording, tree, settings.topics)
     stream = read_robot_poses(recording, tree, topics, settings.base, settings.tool, settings.urdf)
     said(f"poses: {stream.source}, {len(stream.times)} of them{_rate(stream.times)}")
+    if settings.urdf and recording.topics[topics[0]].kind != JOINT_KIND:
+        said.warning(f"--urdf {settings.urdf}: is not used, since the poses are no joints")
     return stream, topics[0]
 
 
@@ -190,7 +194,7 @@ def run(settings):
         with Recording(settings.recording) as recording:
             list_topics(recording)
         return DONE
-    if settings.views < 0 or (settings.views and settings.every is not None):
+    if settings.views is not None and (settings.views <= 0 or settings.every is not None):
         raise RecordingError("--views: expected a number above 0, without --every")
     said = Said(settings.quiet)
     with Recording(settings.recording) as recording:

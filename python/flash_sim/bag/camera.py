@@ -1,5 +1,7 @@
 """A camera of a recording: its topics, its lens, when its pictures were taken, and its pictures one by one."""
 import io
+import pathlib
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +12,9 @@ from flash_sim.bag.errors import refusal
 from flash_sim.bag.lens import Lens, expect_size, lens_of
 from flash_sim.bag.pictures import depth_of, frame_of, picture_of, stamp_of
 from flash_sim.bag.realsense import MILLIMETRES
+
+# One of them is in each file of intrinsics that flash-calib reads.
+LENS_WORDS = re.compile(r"matrix|mtx|intrinsic|focal|camera|\bfx\b|\bk\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -108,10 +113,12 @@ def lens_text(camera, path):
     if camera.lens is not None:
         return camera.lens.text()
     try:
-        with open(path, "rb") as file:
-            return file.read()
-    except OSError as error:
-        raise refusal(path, f"cannot be read: {error.strerror}") from error
+        text = pathlib.Path(path).read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise refusal(path, f"cannot be read: {error}") from error
+    if not LENS_WORDS.search(text):
+        raise refusal(path, "found no lens, expected a camera_info, or another file of intrinsics that flash-calib reads")
+    return text
 
 
 def paired_depth(path, camera, said):

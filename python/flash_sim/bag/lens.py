@@ -76,6 +76,8 @@ def lens_of(message, where, rectified=False):
     fx, fy, cx, cy = (p[0], p[5], p[2], p[6]) if rectified and p[0] > 0 else (k[0], k[4], k[2], k[5])
     if not (fx > 0 and fy > 0 and np.isfinite([fx, fy, cx, cy]).all()):
         raise refusal(where, f"found a focal length of {fx:.6g} px, expected that of a calibrated camera")
+    if not np.isfinite(d).all():
+        raise refusal(where, f"found the distortion {', '.join(f'{value:g}' for value in d)}, expected finite numbers")
     lens = Lens(int(message.width), int(message.height), *map(float, (fx, fy, cx, cy)))
     if rectified and p[0] > 0:
         return lens

@@ -70,6 +70,42 @@ TEST(JointErrors, ZerosAreFoundAndTakeTheirErrorOutOfTheAnswer) {
   EXPECT_LT(squared, 1.8);
 }
 
+// One zero by twenty of its deviations: it is found to what the others are, and they are not bent by it.
+TEST(JointErrors, AZeroThatIsGrosslyOffIsFoundAndNamed) {
+  for (const double off : {1.0, 2.0, -4.0}) {
+    WrongArm wrong = turned(Eigen::VectorXd::Zero(6));
+    wrong.zeros[3] = off * M_PI / 180;
+    const HandEyeScene scene = recorded(wrong, Known::joints, 950);
+    const Calibration result = calibrated(scene);
+    const JointErrors found = *errors_of(result);
+    EXPECT_NEAR(found.estimate[3], wrong.zeros[3], 4 * found.sd[3]) << off;
+    EXPECT_LT(found.sd[3], 0.02 * M_PI / 180) << off;
+    for (const Eigen::Index other : {1, 2, 4})
+      EXPECT_NEAR(found.estimate[other], 0, 4 * found.sd[other]) << off;
+    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.458) << off;  // of 99.9 %
+    const std::vector<std::string> sentences = joints_far_off(found, described_arm({}, 0));
+    ASSERT_EQ(sentences.size(), 1u) << off;
+    EXPECT_NE(sentences.front().find("were to be expected"), std::string::npos) << sentences.front();
+  }
+}
+
+// What the linear problem has of the prior is its gradient, and half of the cost's is the solver's.
+TEST(JointErrors, WeightsAreTheDerivativeOfTheCost) {
+  Bundle bundle;
+  bundle.joint_error_sd = {Eigen::Vector3d(1e-3, 2e-3, 3e-4)};
+  bundle.joint_errors = {Eigen::Vector3d(5e-4, -3e-2, 0)};
+  const auto cost = [&](Eigen::Index i, double error) {
+    return kJointErrorTail * std::log1p(std::pow(error / bundle.joint_error_sd[0][i], 2) / kJointErrorTail);
+  };
+  const Eigen::VectorXd weights = joint_error_weights(bundle, 0);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double at = bundle.joint_errors[0][i], step = 1e-4 * bundle.joint_error_sd[0][i];
+    EXPECT_NEAR(weights[i] * at, 0.5 * (cost(i, at + step) - cost(i, at - step)) / (2 * step),
+                1e-6 * weights[i] * bundle.joint_error_sd[0][i]);
+  }
+}
+
 // Zeros and lengths drawn from what is known of them: intervals of 95 % hold, those of lengths that are told
 // too, and the camera is nearer to where it is than with the lengths as described.
 TEST(JointErrors, LengthsAreFoundBesideZeros) {

@@ -10,6 +10,8 @@ namespace {
 TEST(Chance, IsThatOfChiSquare) {
   EXPECT_EQ(chance_beyond(0, 6), 1);
   EXPECT_NEAR(chance_beyond(5.991, 2), 0.05, 2e-5);  // tables, of three decimals
+  EXPECT_NEAR(chance_beyond(3.841, 1), 0.05, 2e-5);
+  EXPECT_NEAR(chance_beyond(7.815, 3), 0.05, 2e-5);
   EXPECT_NEAR(chance_beyond(12.592, 6), 0.05, 2e-5);
   EXPECT_NEAR(chance_beyond(124.342, 100), 0.05, 2e-5);
   // Of many degrees of freedom it is nearly normal (Wilson and Hilferty 1931).
