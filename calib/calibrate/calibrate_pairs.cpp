@@ -204,6 +204,20 @@ void tell_unseen(Calibration& result, const std::vector<Observation>& observatio
              false);
 }
 
+/// Exchanged pairs of a camera in the hand have X and Z exchanged and inverted: a camera that seems far from
+/// the gripper, and farther than the target from the robot's base.
+void tell_exchanged(Calibration& result) {
+  constexpr double kFarthest = 0.3;  // of cameras in a hand [m]
+  const double camera = result.poses.X.translation().norm(), target = result.poses.Z.translation().norm();
+  if (result.setup != Setup::eye_in_hand || result.along || camera < std::max(kFarthest, target)) return;
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the camera is %.2f m from the gripper, and the target %.2f m from the robot's base: are the "
+                "poses of robot and target exchanged? Such pairs close as well",
+                camera, target);
+  tell_first(result, text, false);
+}
+
 /// What errors that change smoothly with the robot's pose may have done, beside what scatters.
 void add_smooth_errors(Calibration& result, const std::vector<Observation>& observations,
                        const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit) {
@@ -275,6 +289,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   tell_size(result, loops, along, settings);
   tell_size_of_few(result, all, settings);
   tell_unseen(result, observations);
+  tell_exchanged(result);
   result.size->estimate *= result.size_begun;
   result.size->sd *= result.size_begun;
   if (result.size->wanted) {

@@ -107,7 +107,7 @@ void set_attribute(std::string& text, std::size_t begin, const std::string& name
 
 std::string with_joint_origins(const std::string& text, const std::string& path,
                                const std::vector<JointOrigin>& origins) {
-  std::string result = text, parent;
+  std::string result = text, parent, base;
   for (const JointOrigin& origin : origins) {
     tinyxml2::XMLDocument document;
     parse_xml(result, path, "robot", document);
@@ -118,6 +118,11 @@ std::string with_joint_origins(const std::string& text, const std::string& path,
                                   " times, expected once, as in the robot of the calibration");
     const tinyxml2::XMLElement& joint = *found.front();
     expect_same(joint, origin, parent, path);
+    if (parent.empty()) base = link_of(joint, "parent");
+    if (link_of(joint, "child") == base)
+      throw data::input_error(
+          path, "joint " + origin.joint.name,
+          "carries link " + base + ", on which it hangs itself, expected a tree of links");
     parent = link_of(joint, "child");
     if (origin.corrected.matrix() == origin.joint.origin.matrix()) continue;
     const std::string xyz = three(origin.corrected.translation()),

@@ -16,6 +16,9 @@ void parse_xml(const std::string& text, const std::string& path, const std::stri
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
     throw data::InputError(path + ": is no XML: line " + std::to_string(document.ErrorLineNum()));
   const tinyxml2::XMLElement* const element = document.RootElement();
+  if (element != nullptr && element->NextSiblingElement() != nullptr)
+    throw data::InputError(path + ": found <" + element->NextSiblingElement()->Name() +
+                           "> behind the end of <" + element->Name() + ">, expected one of them alone");
   if (element == nullptr || root != element->Name())
     throw data::InputError(path + ": found <" + (element == nullptr ? "" : element->Name()) +
                            ">, expected <" + root + ">");

@@ -73,11 +73,25 @@ std::string content_of(const NumpyArray& array) {
   }
   if (count_of(array.shape) == 0) return "no element";
   if (array.type[0] == '>') return "numbers with their bytes the other way round" + quoted;
-  if (array.shape.size() > 2 && array.values.empty() && (array.type == "<f8" || array.type == "<f4"))
-    return "numbers column by column in " + std::to_string(array.shape.size()) + " dimensions" + quoted;
   return (array.values.empty() ? "numbers of a type that is not read"
                                : "another number of elements than its shape says") +
          quoted;
+}
+
+/// Of numbers whose first index runs fastest, those whose last one does.
+std::vector<double> last_index_first(const std::vector<double>& stored,
+                                     const std::vector<std::size_t>& shape) {
+  std::vector<double> values(stored.size());
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    std::size_t rest = i, place = 0, stride = values.size();
+    for (const std::size_t size : shape) {
+      stride /= size;
+      place += rest % size * stride;
+      rest /= size;
+    }
+    values[place] = stored[i];
+  }
+  return values;
 }
 
 /// Empty of an array that is no list of real numbers.
@@ -107,12 +121,7 @@ NumpyArray array_of(std::string_view npy) {
   if (type == "|i1") values = converted<std::int8_t>(bytes);
   array.whole = !type.empty() && type.size() == 3 && type[1] != 'f';
   const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
-  if (columns_first && array.shape.size() > 2) values.clear();
-  if (columns_first && array.shape.size() == 2 && values.size() == count_of(array.shape)) {
-    const std::size_t rows = array.shape[0], columns = array.shape[1];
-    const std::vector<double> stored = values;
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = stored[(i % columns) * rows + i / columns];
-  }
+  if (columns_first && values.size() == count_of(array.shape)) values = last_index_first(values, array.shape);
   return array;
 }
 

@@ -106,7 +106,8 @@ void expect_metres(const std::vector<double>& distances, const std::string& path
   if (beyond_reach(distances))
     throw input_error(path, "translations",
                       "half of them are beyond " + format_short(median(distances)) +
-                          " m, expected metres (are these millimetres? name the columns x_mm, y_mm, z_mm)");
+                          " m, expected metres (are these millimetres? divide by 1,000, or name the columns "
+                          "of a table x_mm, y_mm, z_mm)");
 }
 
 }  // namespace flash::data

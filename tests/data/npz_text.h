@@ -10,6 +10,7 @@ struct NamedArray {
   std::vector<std::size_t> shape;
   std::vector<double> values;  ///< row by row
   std::string type = "<f8";    ///< that is claimed
+  bool columns_first = false;  ///< likewise
 };
 
 /// An .npz with these arrays of doubles, not compressed.
@@ -18,10 +19,11 @@ inline std::string npz_text(const std::vector<NamedArray>& arrays) {
   const auto number = [](std::string& text, auto value) {
     text.append(reinterpret_cast<const char*>(&value), sizeof value);
   };
-  for (const auto& [name, shape, values, type] : arrays) {
+  for (const auto& [name, shape, values, type, columns_first] : arrays) {
     std::string sizes;
     for (const std::size_t size : shape) sizes += std::to_string(size) + ",";
-    std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': (" + sizes + "), }\n";
+    std::string header = "{'descr': '" + type + "', 'fortran_order': " + (columns_first ? "True" : "False") +
+                         ", 'shape': (" + sizes + "), }\n";
     std::string npy = "\x93NUMPY";
     npy += std::string("\x01\x00", 2);
     number(npy, static_cast<std::uint16_t>(header.size()));

@@ -280,6 +280,20 @@ TEST(Pairs, WhoseTargetNoCameraSeesAreDoubted) {
   }
 }
 
+// Of a camera in the hand the target may stand before it either way; how far it is tells it.
+TEST(Pairs, ThatAreExchangedAreDoubtedByTheirDistances) {
+  std::vector<Observation> pairs = pairs_of(noisy_scene(Mount::eye_in_hand, 0.3, 1.0, 31));
+  const auto doubted = [&] {
+    const std::vector<std::string> warnings = calibrate_pairs(Mount::eye_in_hand, pairs).warnings;
+    return std::any_of(warnings.begin(), warnings.end(), [&](const std::string& warning) {
+      return warning.find("exchanged? Such pairs close as well") != std::string::npos;
+    });
+  };
+  EXPECT_FALSE(doubted());
+  for (Observation& pair : pairs) std::swap(pair.T_base_gripper, pair.T_camera_target.front());
+  EXPECT_TRUE(doubted());
+}
+
 TEST(Pairs, OfARobotThatOnlyTurnsDoNotTellTheSize) {
   HandEyeScene scene = noisy_scene(Mount::eye_in_hand, 0.5, 0.5, 21);
   const Eigen::Vector3d place = scene.true_poses.front().translation();

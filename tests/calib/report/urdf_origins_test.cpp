@@ -116,6 +116,9 @@ TEST_F(UrdfOrigins, OfAnotherRobotAreRefused) {
                  "joint wrist: found parent upper, expected fore");
   EXPECT_NE(refusal(kArm, "0 0 0.3", "0 0 ${h}").find("expected numbers"), std::string::npos);
   EXPECT_NE(refusal(kArm, "</robot>", "").find("is no XML"), std::string::npos);
+  EXPECT_NE(refusal(kArm, "</robot>", "</robot><robot/>").find("behind the end"), std::string::npos);
+  expect_refusal("<parent link=\"base\"/>", "<parent link=\"tool\"/>",
+                 "carries link tool, on which it hangs itself");
 }
 
 }  // namespace

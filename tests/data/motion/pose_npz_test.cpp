@@ -45,6 +45,18 @@ TEST(PairsOfNumpy, AreReadAsMatrices) {
                                                                     {robots[i], {2, 4, 4}, kMatrices}}))));
 }
 
+// numpy.save keeps the order of a stack that is transposed.
+TEST(PairsOfNumpy, AreReadInEitherOrder) {
+  const TemporaryFolder folder;
+  std::vector<double> stored;
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 4; ++row)
+      for (const double* pose : {kFirst, kSecond}) stored.push_back(pose[4 * row + column]);
+  const NamedArray robot{"robot", {2, 4, 4}, stored, "<f8", true};
+  expect_both(
+      load_pose_pairs(folder.write("pairs.npz", npz_text({robot, {"target", {2, 4, 4}, kMatrices}}))));
+}
+
 TEST(PairsOfNumpy, AreReadAsOpenCvTakesThem) {
   const TemporaryFolder folder;
   const std::vector<double> R = both([](int row, int column) { return row < 3 && column < 3; }),
