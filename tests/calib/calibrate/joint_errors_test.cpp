@@ -90,22 +90,6 @@ TEST(JointErrors, AZeroThatIsGrosslyOffIsFoundAndNamed) {
   }
 }
 
-// What the linear problem has of the prior is its gradient, and half of the cost's is the solver's.
-TEST(JointErrors, WeightsAreTheDerivativeOfTheCost) {
-  Bundle bundle;
-  bundle.joint_error_sd = {Eigen::Vector3d(1e-3, 2e-3, 3e-4)};
-  bundle.joint_errors = {Eigen::Vector3d(5e-4, -3e-2, 0)};
-  const auto cost = [&](Eigen::Index i, double error) {
-    return kJointErrorTail * std::log1p(std::pow(error / bundle.joint_error_sd[0][i], 2) / kJointErrorTail);
-  };
-  const Eigen::VectorXd weights = joint_error_weights(bundle, 0);
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const double at = bundle.joint_errors[0][i], step = 1e-4 * bundle.joint_error_sd[0][i];
-    EXPECT_NEAR(weights[i] * at, 0.5 * (cost(i, at + step) - cost(i, at - step)) / (2 * step),
-                1e-6 * weights[i] * bundle.joint_error_sd[0][i]);
-  }
-}
-
 // Zeros and lengths drawn from what is known of them: intervals of 95 % hold, those of lengths that are told
 // too, and the camera is nearer to where it is than with the lengths as described.
 TEST(JointErrors, LengthsAreFoundBesideZeros) {

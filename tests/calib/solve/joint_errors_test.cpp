@@ -42,25 +42,30 @@ TEST(JointErrorTerms, CorrectionsHaveTheirDerivatives) {
   }
 }
 
-TEST(JointErrorTerms, PriorsAreTheirSquaresOverVariances) {
+// cost = c log(1 + (error / sd)^2 / c); the linear model has half of its derivative, by central differences.
+TEST(JointErrorTerms, PriorsAreDerivativesOfTheirCost) {
   const WrongArm wrong = draw_wrong_arm(12, 0.5e-3);
   const HandEyeScene scene = recorded(wrong, Known::joints_and_lengths, 12, Setup::eye_in_hand, 0.7e-3);
   Bundle bundle = seeded_bundle(scene);
   ASSERT_EQ(bundle.joint_errors.front().size(), 21);
   bundle.joint_errors.front() << wrong.zeros, wrong.lengths;
+  bundle.joint_errors.front()[2] = 20 * kUsualJointZero;  // far out
   BundleSettings settings;
   settings.unknowns.joint_errors = true;
   const LinearModel model = linearize(bundle, uniform_noise(bundle, 0.1, 1e-4, 3e-5, 1e-3), settings);
   const Eigen::Index first = shared_columns(bundle, settings.unknowns).joint_errors.front(),
                      last = model.prior.cols() - 1;
-  double squares = 0;
   for (Eigen::Index i = 0; i < 21; ++i) {
-    const double sd = i < 6 ? kUsualJointZero : 0.7e-3, error = bundle.joint_errors.front()[i];
-    EXPECT_NEAR(model.prior(first + i, first + i) * sd * sd, 1, 1e-12);
-    EXPECT_NEAR(model.prior(first + i, last) * sd * sd, error, 1e-15);
-    squares += error * error / (sd * sd);
+    const double sd = i < 6 ? kUsualJointZero : 0.7e-3, error = bundle.joint_errors.front()[i],
+                 step = 1e-4 * sd;
+    const auto cost = [&](double e) {
+      return kJointErrorTail * std::log1p(std::pow(e / sd, 2) / kJointErrorTail);
+    };
+    EXPECT_NEAR(model.prior(first + i, last), (cost(error + step) - cost(error - step)) / (4 * step),
+                1e-6 / sd);
+    EXPECT_NEAR(model.prior(first + i, first + i) * error, model.prior(first + i, last), 1e-12 / sd);
+    EXPECT_LE(model.prior(first + i, first + i) * sd * sd, 1);
   }
-  EXPECT_NEAR(model.prior(last, last), squares, 1e-9 * squares);
 }
 
 }  // namespace
