@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Every field of what flash-calib prints as JSON, at any depth, is one that docs/formats.md names."""
 import argparse
+import itertools
 import json
 import pathlib
 import sys
@@ -38,9 +39,7 @@ def outputs(calib, work):
     (work / "pairs.samples").write_text(json.dumps({"samples": [
         {"robot": form(view["base_gripper"]), "tracking": form(view["camera_target"])} for view in solved if view["used"]]}))
     left = json.loads((work / "left/camera.json").read_text())
-    (cx, cy), place = left["lens"]["centre_px"], left["transform"]["translation"]
-    ahead = [place[i] + row[2] for i, row in enumerate(program.rotation_of(left["transform"]["rotation_xyzw"]))]  # a metre before the camera
-    (work / "touched.csv").write_text("x,y,z,u,v\n" + ",".join(map(str, (*ahead, cx, cy))) + "\n")
+    (work / "touched.csv").write_text("x,y,z,u,v\n" + "".join(touched(left)))
     for words in (("handeye", work / "pairs.samples", "--setup", "eye-to-hand"),
                   ("handeye", work / "one_axis", "--target-height", "0:0.005", *cache),
                   ("register", work / "left/camera.json", work / "right/camera.json", "--workspace", "0.4,0,0.1", *cache),
@@ -52,6 +51,15 @@ def outputs(calib, work):
                   ("validate", "--touched", work / "touched.csv", "--extrinsics", work / "left/camera.json"),
                   ("export", work / "wrist/camera.json", "--to", "usd", "-o", work / "camera.usda")):
         yield " ".join(map(str, words[:2])), program.must(calib, *words, "--json").stdout
+
+
+def touched(answer):
+    """Places before a camera that were touched, and their pixels, near enough to its axis for a lens without distortion."""
+    (cx, cy), (fx, fy), place = (answer[key][name] for key, name in (("lens", "centre_px"), ("lens", "focal_px"), ("transform", "translation")))
+    R = program.rotation_of(answer["transform"]["rotation_xyzw"])
+    for z, x, y in itertools.product((0.8, 1.2), (-0.1, 0.1), (-0.1, 0.1)):
+        there = [at + sum(r * c for r, c in zip(row, (x, y, z))) for at, row in zip(place, R)]
+        yield ",".join(map(str, (*there, cx + fx * x / z, cy + fy * y / z))) + "\n"
 
 
 def paths(value, path=""):
