@@ -28,24 +28,31 @@ double step_of(const Axis& axis, double value) {
   return kRangeStep * std::max(std::abs(value), 0.1);
 }
 
+/// The values, then each parameter a step lower and higher. spacing: between both, in its coordinate.
+std::vector<std::vector<double>> steps_about(const std::vector<double>& values, const std::vector<Axis>& axes,
+                                             std::vector<double>& spacing) {
+  std::vector<std::vector<double>> wanted = {values};
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const double step = step_of(axes[k], values[k]);
+    std::vector<double> low = values, high = values;
+    low[k] = moved(axes[k], values[k], -step);
+    high[k] = moved(axes[k], values[k], step);
+    spacing.push_back(coordinate(axes[k], high[k]) - coordinate(axes[k], low[k]));
+    wanted.push_back(low);
+    wanted.push_back(high);
+  }
+  return wanted;
+}
+
 }  // namespace
 
 Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSettings& grid,
                                 const std::vector<double>& values, bool differentiate,
                                 const MotionsAt& motions) {
   const std::size_t parameters = grid.axes.size();
-  std::vector<std::vector<double>> wanted = {values};
-  std::vector<double> spacing(parameters);
-  for (std::size_t k = 0; k < parameters && differentiate; ++k) {
-    const Axis& axis = grid.axes[k];
-    const double step = step_of(axis, values[k]);
-    std::vector<double> low = values, high = values;
-    low[k] = moved(axis, values[k], -step);
-    high[k] = moved(axis, values[k], step);
-    spacing[k] = coordinate(axis, high[k]) - coordinate(axis, low[k]);
-    wanted.push_back(low);
-    wanted.push_back(high);
-  }
+  std::vector<double> spacing;
+  const std::vector<std::vector<double>> wanted =
+      steps_about(values, differentiate ? grid.axes : std::vector<Axis>(), spacing);
   std::vector<std::vector<ReplayResult>> runs;
   Sensitivity result;
   for (std::size_t r = 0; r < replays.size(); ++r) {

@@ -201,6 +201,15 @@ void hold(const std::vector<TwoMeshSlice>& from, double value, std::vector<TwoMe
   for (std::size_t r = 0; r < from.size(); ++r) to[r].hold(from[r], value);
 }
 
+/// Values of the first two axes of the place-th piece of work, of which each first value has `seconds`: those
+/// of `together` first values take turns.
+std::pair<std::size_t, std::size_t> first_two(std::size_t place, std::size_t firsts, std::size_t seconds,
+                                              std::size_t together) {
+  const std::size_t begun = place / (together * seconds) * together,
+                    under_way = std::min(together, firsts - begun), within = place - begun * seconds;
+  return {begun + within % under_way, within / under_way};
+}
+
 }  // namespace
 
 Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>& axes,
@@ -226,9 +235,7 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
   std::vector<Shared> shared(firsts);
   for (Shared& each : shared) each.left = seconds;
   data::for_each_in_parallel(firsts * seconds, grid.threads, [&](std::size_t place) {
-    const std::size_t begun = place / (together * seconds) * together,
-                      under_way = std::min(together, firsts - begun), within = place - begun * seconds,
-                      first_value = begun + within % under_way, second_value = within / under_way;
+    const auto [first_value, second_value] = first_two(place, firsts, seconds, together);
     Shared& each = shared[first_value];
     std::call_once(each.made, [&] { hold(all, axes[0].values[first_value], each.slices); });
     std::vector<Slices> held(axes.size());  // one an axis

@@ -306,6 +306,76 @@ void keep_predictable(const std::vector<double>& best, const GridSettings& grid,
           " keyframes carry no weight; --no-horizon keeps them");
 }
 
+const std::vector<double>& best_values(const GridResults& results, const Answer& answer) {
+  return results.candidates[static_cast<std::size_t>(answer.best)].values;
+}
+
+/// Puts what was concluded into an answer whose best candidate and horizons are known, behind its warnings.
+Found take(Concluded concluded, Answer& answer) {
+  concluded.answer.best = answer.best;
+  concluded.answer.horizons = std::move(answer.horizons);
+  concluded.answer.warnings.insert(concluded.answer.warnings.begin(), answer.warnings.begin(),
+                                   answer.warnings.end());
+  answer = std::move(concluded.answer);
+  return std::move(concluded.found);
+}
+
+/// The answer of a search whose estimate cannot be simulated.
+Answer answer_by_best(const GridResults& results, const std::vector<Replay>& replays,
+                      const GridSettings& grid, const MotionStore& store, const std::vector<double>& best,
+                      Answer answer) {
+  answer.values = best;
+  answer.estimate = results.candidates[static_cast<std::size_t>(answer.best)];
+  for (const Replay& replay : replays) answer.motions.push_back(store.run(replay, candidate_at(best, grid)));
+  answer.fit = {replays, answer.motions, answer.estimate};
+  answer.parameters = findings_without_posterior(results, best);
+  answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
+  return answer;
+}
+
+/// Doubts of an estimate beside the candidate that came nearest.
+void warn_of_estimate(const Task& task, const Found& found, const CandidateResult& nearest, Answer& answer) {
+  if (answer.estimate.score > kFarther * nearest.score)
+    answer.warnings.push_back("the best candidate misses the cloth by " + millimetres(nearest.score) +
+                              ", the estimate by " + millimetres(answer.estimate.score) +
+                              ": errors of the cells, of the step and of what is held decide between them; "
+                              "search on a finer mesh, with a shorter step, or what is held too");
+  warn_of_held(task, answer.values, found.look.likelihood, found.errors, answer.warnings);
+  if (found.look.draws && !found.look.draws->enough)
+    answer.warnings.push_back(
+        "the posterior stands on " + std::to_string(std::lround(found.look.draws->effective_size)) +
+        " effective draws, expected " + std::to_string(std::lround(ImportanceSettings{}.enough)) +
+        ": intervals are rough; search fewer parameters or a smaller range");
+}
+
+/// What the likelihood at the fit says of each recording, and of what is not searched.
+void tell_recordings(const Task& task, const Found& found, const std::vector<KnownError>& held,
+                     Answer& answer) {
+  const MotionLikelihood at_fit =
+      likelihood_about(task, found, answer.fit.replays, answer.values, answer.fit.motions, held);
+  for (std::size_t r = 0; r < task.replays.size(); ++r) {
+    answer.misfits.push_back(at_fit.of_recording(r).misfit());
+    answer.clocks.push_back({at_fit.registration(r)[4], at_fit.registration_spread(r)[4]});
+  }
+  answer.contradicted = contradicted_stiffnesses(task, answer.values, at_fit, errors_about(found, held));
+  answer.residuals = left_residuals(at_fit);
+  answer.open_information =
+      open_information(at_fit, spreads_over(task.ranges, extent_of(found.look.posterior.axes)));
+}
+
+/// Findings, covariance and draws. `grid`: as it was typed.
+void tell_parameters(const Task& task, const Found& found, const GridResults& results,
+                     const GridSettings& grid, Answer& answer) {
+  Posterior posterior = found.look.posterior;
+  if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), task.ranges);
+  if (const double spread = spread_of_scale(task.grid, task.replays); spread > 0)
+    answer.weights = weight_of(grid) *
+                     scale_together(posterior, stiffnesses_of(posterior.axes), spread, task.ranges).array();
+  answer.parameters = findings_of(results, task.ranges, posterior, grid.base);
+  answer.covariance_log = covariance_of_logarithms(posterior);
+  answer.samples = samples_of(posterior);
+}
+
 }  // namespace
 
 AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
@@ -356,15 +426,13 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.best = best_of(results);
   if (answer.best < 0) return answer;
   const MotionStore store(grid.rollouts, grid.shard);
-  std::vector<double> best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   if (settings.horizon) {
-    keep_predictable(best, grid, store, results, replays, answer, told);
+    keep_predictable(best_values(results, answer), grid, store, results, replays, answer, told);
     answer.best = best_of(results);
-    best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   } else if (told) {
     told({}, {static_cast<int>(replays.size() * most_horizon_motions(grid)), 0});
   }
-
+  const std::vector<double> best = best_values(results, answer);
   GridSettings usable = grid;
   usable.axes = in_own_coordinates(axes_without_diverged(results, best));
   if (cartesian_product(usable.axes).size() < results.candidates.size())
@@ -393,59 +461,16 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   };
   std::optional<Found> found = look_on_smaller_cells(best);
   if (!found) found = first_look(task, best, held);
-  if (!found) {
-    answer.values = best;
-    answer.estimate = results.candidates[static_cast<std::size_t>(answer.best)];
-    for (const Replay& replay : replays)
-      answer.motions.push_back(store.run(replay, candidate_at(best, grid)));
-    answer.fit = {replays, answer.motions, answer.estimate};
-    answer.parameters = findings_without_posterior(results, best);
-    answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
-    return answer;
-  }
+  if (!found) return answer_by_best(results, replays, grid, store, best, std::move(answer));
   found = about_told_grasp(task, std::move(*found), usable, held);
   if (std::optional<Found> there = look_on_smaller_cells(found->look.posterior.values()))
     found = about_told_grasp(task, std::move(*there), usable, held);
   const std::vector<Alone> alone = alone_over_all(task, *found, results);
-  Concluded concluded = conclude(task, std::move(*found), best, held, alone);
-  const Found& there = concluded.found;
-  concluded.answer.best = answer.best;
-  concluded.answer.horizons = std::move(answer.horizons);
-  concluded.answer.warnings.insert(concluded.answer.warnings.begin(), answer.warnings.begin(),
-                                   answer.warnings.end());
-  answer = std::move(concluded.answer);
-  const CandidateResult& nearest = results.candidates[static_cast<std::size_t>(answer.best)];
-  if (answer.estimate.score > kFarther * nearest.score)
-    answer.warnings.push_back("the best candidate misses the cloth by " + millimetres(nearest.score) +
-                              ", the estimate by " + millimetres(answer.estimate.score) +
-                              ": errors of the cells, of the step and of what is held decide between them; "
-                              "search on a finer mesh, with a shorter step, or what is held too");
-  warn_of_held(task, answer.values, there.look.likelihood, there.errors, answer.warnings);
-  if (there.look.draws && !there.look.draws->enough)
-    answer.warnings.push_back(
-        "the posterior stands on " + std::to_string(std::lround(there.look.draws->effective_size)) +
-        " effective draws, expected " + std::to_string(std::lround(ImportanceSettings{}.enough)) +
-        ": intervals are rough; search fewer parameters or a smaller range");
-
-  Posterior posterior = there.look.posterior;
-  if (answer.by_points) posterior = up_to_neighbours(std::move(posterior), ranges);
-  if (const double spread = spread_of_scale(usable, replays); spread > 0)
-    answer.weights =
-        weight_of(grid) * scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges).array();
-  const MotionLikelihood at_fit =
-      likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held);
-  for (std::size_t r = 0; r < replays.size(); ++r) {
-    answer.misfits.push_back(at_fit.of_recording(r).misfit());
-    answer.clocks.push_back({at_fit.registration(r)[4], at_fit.registration_spread(r)[4]});
-  }
-  answer.contradicted = contradicted_stiffnesses(task, answer.values, at_fit, errors_about(there, held));
-  answer.residuals = left_residuals(at_fit);
-  answer.open_information =
-      open_information(at_fit, spreads_over(ranges, extent_of(there.look.posterior.axes)));
-  answer.parameters = findings_of(results, ranges, posterior, grid.base);
+  const Found there = take(conclude(task, std::move(*found), best, held, alone), answer);
+  warn_of_estimate(task, there, results.candidates[static_cast<std::size_t>(answer.best)], answer);
+  tell_parameters(task, there, results, grid, answer);
+  tell_recordings(task, there, held, answer);
   warn_of_cells(task, answer.values, held, answer.warnings);
-  answer.covariance_log = covariance_of_logarithms(posterior);
-  answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, there);
   if (answer.agreement)
     if (const std::string text = better_text(*answer.agreement, usable.axes); !text.empty())

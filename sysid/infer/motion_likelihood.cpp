@@ -26,31 +26,11 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
     recording.bounds << bounds.offset, bounds.yaw, bounds.time;
     recording.nuisance.registration << fit.offset, fit.yaw, fit.time_offset;
     recording.nuisance.errors = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(errors.size()));
-    recording.errors.resize(errors.size());
-    recording.bends.resize(errors.size());
     // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
     for (const KnownError& error : errors)
       recording.sizes.push_back(error.spread *
                                 (error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1));
-    std::vector<SheetShifts> corrections(errors.size());
-    data::for_each_in_parallel(errors.size(), replay.settings.threads, [&](std::size_t e) {
-      const double size = recording.sizes[e];
-      SheetShifts shifts = shifts_of(errors[e].terms, first + r, replay, fit.time_offset);
-      add(recording.errors[e], size, shifts);
-      if (errors[e].corrects) corrections[e] = std::move(shifts);
-      if (!errors[e].bend.empty())
-        add(recording.bends[e], size * size, shifts_of(errors[e].bend, first + r, replay, fit.time_offset));
-    });
-    for (const SheetShifts& shifts : corrections)
-      if (!shifts.empty()) add(recording.correction, 1, shifts);
-    std::vector<const SheetShifts*> shapes = {&recording.correction};
-    for (const SheetShifts& error : recording.errors) shapes.push_back(&error);
-    for (std::size_t e = 0; e < errors.size(); ++e) {
-      if (recording.bends[e].empty()) continue;
-      shapes.push_back(&recording.bends[e]);
-      recording.bent.push_back(static_cast<Eigen::Index>(e));
-    }
-    recording.shapes = side_by_side(shapes, replay.settings.threads);
+    add_errors(recording, errors, first + r, fit.time_offset);
     std::vector<SheetShifts> by_parameter;
     for (const MotionChange& rate : rates)
       by_parameter.push_back(shifts_of(rate, r, replay, fit.time_offset));
@@ -65,10 +45,37 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                 replay.settings.threads)
                 .first;
     }
-    // From here on their shapes side by side do.
-    recording.errors = recording.bends = {};
-    recording.correction = {};
+    recording.errors = recording.bends = {};  // from here on their shapes side by side do
   });
+}
+
+void MotionLikelihood::add_errors(Recording& recording, const std::vector<KnownError>& errors,
+                                  std::size_t index, double time_offset) {
+  const Replay& replay = recording.replay;
+  const int threads = replay.settings.threads;
+  std::vector<SheetShifts>&shifts = recording.errors, &bends = recording.bends;
+  std::vector<SheetShifts> corrections(errors.size());
+  shifts.resize(errors.size());
+  bends.resize(errors.size());
+  data::for_each_in_parallel(errors.size(), threads, [&](std::size_t e) {
+    const double size = recording.sizes[e];
+    SheetShifts one = shifts_of(errors[e].terms, index, replay, time_offset);
+    add(shifts[e], size, one);
+    if (errors[e].corrects) corrections[e] = std::move(one);
+    if (!errors[e].bend.empty())
+      add(bends[e], size * size, shifts_of(errors[e].bend, index, replay, time_offset));
+  });
+  SheetShifts correction;
+  for (const SheetShifts& each : corrections)
+    if (!each.empty()) add(correction, 1, each);
+  std::vector<const SheetShifts*> shapes = {&correction};
+  for (const SheetShifts& error : shifts) shapes.push_back(&error);
+  for (std::size_t e = 0; e < errors.size(); ++e) {
+    if (bends[e].empty()) continue;
+    shapes.push_back(&bends[e]);
+    recording.bent.push_back(static_cast<Eigen::Index>(e));
+  }
+  recording.shapes = side_by_side(shapes, threads);
 }
 
 void MotionLikelihood::linearize(Recording& recording, const Motion& motion,

@@ -83,8 +83,8 @@ class MotionLikelihood {
     // bends.
     std::vector<SheetShifts> errors, bends;
     std::vector<double> sizes;  ///< of each known error, standard deviations
-    SheetShifts correction;
-    /// Of each keyframe: the correction, all errors and the bends there are.
+    /// Of each keyframe: what corrects the motion, one standard deviation of each known error, and its square
+    /// of those that bend.
     std::vector<SheetShapes> shapes;
     std::vector<Eigen::Index> bent;  ///< the errors that bend, in that order
     Nuisance nuisance;               ///< of the reference
@@ -94,6 +94,9 @@ class MotionLikelihood {
     std::optional<LinearObservations> near;               ///< of the reference
     std::optional<ResidualLikelihood> likelihood;
   };
+  /// What the index-th recording, at a time offset, takes of the errors: sizes, shapes, and those that bend.
+  static void add_errors(Recording& recording, const std::vector<KnownError>& errors, std::size_t index,
+                         double time_offset);
   /// Makes the likelihood that is linear about a motion at the recording's nuisance.
   static void linearize(Recording& recording, const Motion& motion, const std::vector<SheetShifts>& rates,
                         std::optional<double> repeatability, std::optional<double> limit);

@@ -64,84 +64,127 @@ double likelier_by_own_measure(const Task& task, const Found& found, const std::
   return least - likelihood.deviance(motions_in(own), task.grid.threads);
 }
 
+/// What the answer may be of: the mode of the posterior, and the best candidate of the search.
+struct Rivals {
+  std::vector<double> mode, best;
+  std::vector<ReplayResult> mode_on_own, mode_there;  ///< on the search's mesh, and on that of the emulator
+  std::vector<ReplayResult> best_on_own;
+};
+
+/// Empty where the mode diverges.
+std::optional<Rivals> simulate_rivals(const Task& task, const Found& found, const std::vector<double>& best) {
+  Rivals rivals;
+  rivals.mode = found.look.posterior.values();
+  rivals.best = best;
+  auto there = simulate_at(task, found.emulator, rivals.mode, false, rivals.mode_on_own);
+  if (!there) return std::nullopt;
+  rivals.mode_there = std::move(*there);
+  for (const Replay& replay : task.replays)
+    rivals.best_on_own.push_back(task.store.run(replay, candidate_at(best, task.grid)));
+  return rivals;
+}
+
+Extent at(const std::vector<double>& values) {
+  Extent extent;
+  for (const double value : values) extent.push_back({value, value});
+  return extent;
+}
+
+/// How much likelier the search's best is than the mode, as a deviance. Where the best is beyond the
+/// emulator's grid, both are moved alike to cells of no size.
+double fall_to_best(const Task& task, const Found& found, const Rivals& rivals,
+                    std::vector<KnownError> errors) {
+  const std::vector<Replay> there = replays_of(found.emulator);
+  errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, rivals.mode_on_own})},
+                     {1, std::make_shared<const Motions>(Motions{there, rivals.mode_there})}},
+                    true,
+                    true});
+  const MotionLikelihood likelihood =
+      likelihood_about(task, found, task.replays, rivals.mode, rivals.mode_on_own, std::move(errors));
+  return likelihood.deviance(motions_in(rivals.mode_on_own), task.grid.threads) -
+         likelihood.deviance(motions_in(rivals.best_on_own), task.grid.threads);
+}
+
+/// How the likelihood of an answer on cells of no size takes its mode, and the least over its points.
+struct AtLimit {
+  const MotionLikelihood& likelihood;
+  std::vector<MotionLikelihood::Nuisance> fitted;  ///< at the mode
+  double mode = 0, points = 0;                     ///< deviances; of a mode that diverges NaN
+};
+
+/// Whether motions of the search's own mesh explain the recordings better than those of cells of no size.
+bool own_mesh_explains(const Task& task, Found& found, const Rivals& rivals, const AtLimit& limit,
+                       const std::vector<KnownError>& held) {
+  constexpr double kFails = 3;  // of a deviance: strips on either mesh differ by 2 at most
+  constexpr double kUnlikely = 9;
+  const std::vector<Replay> replays = replays_of(found.emulator);
+  const MotionLikelihood& likelihood = limit.likelihood;
+  const double share = std::exchange(found.emulator.share, own_mesh);
+  Eigen::Index likeliest;
+  const double of_own = deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(&likeliest),
+               better = std::min(limit.points, std::isnan(limit.mode) ? INFINITY : limit.mode) - of_own;
+  found.emulator.share = share;
+  // Of the own mesh: the likeliest about the mode, and the search's best, which may be far from there.
+  std::vector<ReplayResult> nearest =
+      motions_at(found.emulator, values_of(found.axes, static_cast<int>(likeliest)), own_mesh);
+  std::vector<ReplayResult> best_there = rivals.best_on_own;
+  std::vector<Motion> mode_on_own;
+  for (std::size_t r = 0; r < best_there.size(); ++r) {
+    const auto& model = found.emulator.models[r].model;
+    best_there[r].motion = model.on_its_mesh(rivals.best_on_own[r].motion);
+    mode_on_own.push_back(model.on_its_mesh(rivals.mode_on_own[r].motion));
+  }
+  if (score_of(task, replays, best_there) < score_of(task, replays, nearest)) nearest = std::move(best_there);
+  const bool by_extrapolation_alone =
+      better > -kFails && !(likelihood.deviance(mode_on_own, task.grid.threads) - of_own < kUnlikely);
+  return better > kFails || by_extrapolation_alone ||
+         ask_for_own_mesh(found, held, likelihood, limit.fitted) ||
+         likelier_by_own_measure(task, found, held, nearest, rivals.mode_there) > kFails;
+}
+
+/// Whether the search's best comes nearer to what was observed than the mode, on its mesh and on the
+/// answer's.
+bool best_is_nearer(const Task& task, const Found& found, const Rivals& rivals) {
+  constexpr double kFarther = 1.3;  // of a distance
+  if (!(kFarther * score_of(task, task.replays, rivals.best_on_own) <
+        score_of(task, task.replays, rivals.mode_on_own)))
+    return false;
+  const std::vector<Replay> replays = replays_of(found.emulator);
+  std::vector<ReplayResult> on_own_mesh;
+  const auto best_there = simulate_at(task, found.emulator, rivals.best, false, on_own_mesh);
+  return best_there &&
+         kFarther * score_of(task, replays, *best_there) < score_of(task, replays, rivals.mode_there);
+}
+
 }  // namespace
 
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
                const std::vector<KnownError>& held) {
-  constexpr double kMatters = 1;  // of a deviance
-  constexpr double kFails = 3;    // of a deviance: strips on either mesh differ by 2 at most
-  constexpr double kUnlikely = 9;
+  constexpr double kMatters = 1;    // of a deviance
   constexpr double kLikely = 3.84;  // as verdicts have it
-  constexpr double kFarther = 1.3;  // of a distance
-  const int threads = task.grid.threads;
-  const std::vector<Replay> on_model = replays_of(found.emulator);
-  const std::vector<double> mode = found.look.posterior.values();
-  std::vector<ReplayResult> own;
-  auto simulated = simulate_at(task, found.emulator, mode, false, own);
-  if (!simulated) return Settled::elsewhere;
-  MotionLikelihood likelihood = likelihood_about(
-      task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
+  const std::optional<Rivals> rivals = simulate_rivals(task, found, best);
+  if (!rivals) return Settled::elsewhere;
+  const std::vector<double>& mode = rivals->mode;
+  MotionLikelihood likelihood =
+      likelihood_about(task, found, replays_of(found.emulator), mode,
+                       motions_at(found.emulator, mode, found.emulator.share), held);
   const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
-  const std::vector<ReplayResult> mode_there = *simulated;
-  const std::vector<Motion> at_mode = motions_in(mode_there);
-  std::vector<MotionLikelihood::Nuisance> fitted;
-  const double of_mode = likelihood.deviance(
-                   [&](std::size_t r, double) -> const Motion& { return at_mode[r]; }, fitted, threads),
-               fall = std::isnan(of_mode) ? INFINITY : std::max(0.0, of_mode - of_points.minCoeff());
-
-  // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
-  std::vector<KnownError> errors = held;
-  errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, own})},
-                     {1, std::make_shared<const Motions>(Motions{on_model, mode_there})}},
-                    true,
-                    true});
-  const MotionLikelihood on_own = likelihood_about(task, found, task.replays, mode, own, std::move(errors));
-  std::vector<ReplayResult> of_best;
-  for (const Replay& replay : task.replays)
-    of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)));
-  const double fall_to_best =
-      on_own.deviance(motions_in(own), threads) - on_own.deviance(motions_in(of_best), threads);
-  Extent at_best;
-  for (const double value : best) at_best.push_back({value, value});
-  if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
-  if (found.emulator.share != own_mesh) {
-    const double share = std::exchange(found.emulator.share, own_mesh);
-    Eigen::Index likeliest;
-    const double on_own_mesh =
-                     deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(&likeliest),
-                 better =
-                     std::min(of_points.minCoeff(), std::isnan(of_mode) ? INFINITY : of_mode) - on_own_mesh;
-    found.emulator.share = share;
-    // Of the own mesh: the likeliest about the mode, and the search's best, which may be far from there.
-    std::vector<ReplayResult> nearest =
-        motions_at(found.emulator, values_of(found.axes, static_cast<int>(likeliest)), own_mesh);
-    std::vector<ReplayResult> best_there = of_best;
-    for (std::size_t r = 0; r < best_there.size(); ++r)
-      best_there[r].motion = found.emulator.models[r].model.on_its_mesh(of_best[r].motion);
-    if (score_of(task, on_model, best_there) < score_of(task, on_model, nearest))
-      nearest = std::move(best_there);
-    std::vector<Motion> mode_on_own;
-    for (std::size_t r = 0; r < own.size(); ++r)
-      mode_on_own.push_back(found.emulator.models[r].model.on_its_mesh(own[r].motion));
-    const bool by_extrapolation_alone =
-        better > -kFails && !(likelihood.deviance(mode_on_own, threads) - on_own_mesh < kUnlikely);
-    if (better > kFails || by_extrapolation_alone || ask_for_own_mesh(found, held, likelihood, fitted) ||
-        likelier_by_own_measure(task, found, held, nearest, mode_there) > kFails)
-      return Settled::on_own_mesh;
+  const std::vector<Motion> at_mode = motions_in(rivals->mode_there);
+  AtLimit limit{.likelihood = likelihood, .fitted = {}, .points = of_points.minCoeff()};
+  limit.mode = likelihood.deviance([&](std::size_t r, double) -> const Motion& { return at_mode[r]; },
+                                   limit.fitted, task.grid.threads);
+  const double fall = std::isnan(limit.mode) ? INFINITY : std::max(0.0, limit.mode - limit.points),
+               to_best = fall_to_best(task, found, *rivals, held);
+  const bool best_beyond = reaches_beyond(at(best), found.axes);
+  if (to_best > fall + kMatters && best_beyond) return Settled::elsewhere;
+  if (found.emulator.share != own_mesh && own_mesh_explains(task, found, *rivals, limit, held))
+    return Settled::on_own_mesh;
+  // Of values that are as good as equally likely, those whose motion is nearest.
+  if (to_best > -kLikely && !best_beyond && best_is_nearer(task, found, *rivals)) {
+    set_estimate(found.look.posterior, found.axes, best);
+    return Settled::by_emulator;
   }
-  // Of values that are as good as equally likely, those whose motion is nearest, on the search's mesh and on
-  // that of the answer.
-  if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes) &&
-      kFarther * score_of(task, task.replays, of_best) < score_of(task, task.replays, own)) {
-    std::vector<ReplayResult> on_own_mesh;
-    const auto best_there = simulate_at(task, found.emulator, best, false, on_own_mesh);
-    if (best_there &&
-        kFarther * score_of(task, on_model, *best_there) < score_of(task, on_model, mode_there)) {
-      set_estimate(found.look.posterior, found.axes, best);
-      return Settled::by_emulator;
-    }
-  }
-  const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, fall_to_best));
+  const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, to_best));
   if (!(share_of_points > 0)) return Settled::by_emulator;
   Posterior by_points = explore_at_points(found.axes, of_points);
   if (share_of_points < 0.5 || !(fall > 0)) set_estimate(by_points, found.axes, mode);
