@@ -203,6 +203,25 @@ void report_depth(const DepthUse& use, ImageCalibration& result) {
                   depth.over_corners, 2 * depth.over_corners_sd));
 }
 
+/// Joints and links that are grossly off. Where motions of first order no longer hold what the answer is
+/// known to, there is none.
+void tell_joints(const JointErrors& errors, const ArmModel& arm, Calibration& result) {
+  for (std::string& sentence : joints_far_off(errors, arm)) result.warnings.push_back(std::move(sentence));
+  double distance = 0;
+  for (const RobotPose& pose : result.refined.bundle.poses)
+    distance = std::max(distance, pose.T_base_gripper.translation().norm());
+  const double rough = second_order(errors, arm, distance),
+               known = std::sqrt(result.covariance.topLeftCorner<3, 3>().trace() / 3);
+  if (!(rough > known)) return;
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "zeros of joints are so far off that places are wrong by up to %.1f mm to second order: put them "
+      "into the URDF (export --despite-doubts --joint-origins), and calibrate with that file",
+      1e3 * rough);
+  tell_first(result, text, true);
+}
+
 }  // namespace
 
 ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Target& target,
@@ -243,9 +262,7 @@ ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Tar
   if (depth) report_depth(depth->use, best);
   const Calibration& answer = best.calibration;
   const auto errors = joint_errors(answer.refined.bundle, answer.unknowns, answer.shared_covariance);
-  if (errors && dataset.arm)
-    for (std::string& sentence : joints_far_off(*errors, *dataset.arm))
-      best.calibration.warnings.push_back(std::move(sentence));
+  if (errors && dataset.arm) tell_joints(*errors, *dataset.arm, best.calibration);
   return best;
 }
 

@@ -8,6 +8,7 @@
 #include "calib/calibrate/stated_uncertainty.h"
 #include "calib/solve/pose_space.h"
 #include "calib/uncertainty/smooth_errors_of_pairs.h"
+#include "calib/uncertainty/step_of_pairs.h"
 #include "data/files/error.h"
 #include "data/numbers/chi_square.h"
 
@@ -160,17 +161,19 @@ void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,
   const auto excluded = [&](const Vector6d& away) {
     return away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_95_of_6;
   };
-  const Vector6d away = away_with(size.wanted->estimate);
-  const bool depends = excluded(away) || excluded(away_with(1));
+  const Vector6d away = away_with(size.wanted->estimate), as_stated = away_with(1);
+  const bool depends = excluded(away) || excluded(as_stated);
   if (settings.size_as_stated) result.covariance += away * away.transpose();
+  const Vector6d& farther = as_stated.head<3>().norm() > away.head<3>().norm() ? as_stated : away;
   char text[400];
   std::snprintf(
       text, sizeof text,
       "the target is %.4g times as large as stated (+- %.2g, 2 sd), or the robot's translations are not "
-      "in metres: measure a square; the answer is for %.4g, and with the other size the camera is "
+      "in metres: measure a square; the answer is for %.4g, and with the stated or the other size the camera "
+      "is up to "
       "%.1f mm and %.2f deg from where it is here (--target-size solved takes the estimate)",
-      size.wanted->estimate, 2 * size.wanted->sd, size.estimate, 1e3 * away.head<3>().norm(),
-      away.tail<3>().norm() * 180 / M_PI);
+      size.wanted->estimate, 2 * size.wanted->sd, size.estimate, 1e3 * farther.head<3>().norm(),
+      farther.tail<3>().norm() * 180 / M_PI);
   tell_first(result, text, depends && !settings.size_as_stated);
 }
 
@@ -216,6 +219,30 @@ void tell_exchanged(Calibration& result) {
                 "poses of robot and target exchanged? Such pairs close as well",
                 camera, target);
   tell_first(result, text, false);
+}
+
+/// A camera or a target that moved at once, of all pairs in their order. Where the stated deviations do not
+/// hold it, there is no answer.
+void tell_step(Calibration& result, const std::vector<Observation>& all) {
+  std::vector<PoseLoop> loops;
+  std::vector<std::string> names;
+  for (const Observation& pair : all) {
+    if (pair.T_camera_target.empty()) continue;
+    loops.push_back(pose_loop(result.setup, pair.T_base_gripper, pair.T_camera_target.front()));
+    names.push_back(pair.image);
+  }
+  const auto step =
+      step_of_pairs(resized(std::move(loops), result.size->estimate * result.size_begun), result.poses);
+  if (!step) return;
+  const bool held = step->motion.dot(result.covariance.ldlt().solve(step->motion)) < data::chi_square_95_of_6;
+  char text[300];
+  std::snprintf(text, sizeof text,
+                "the %s %s by %.1f mm and %.2f deg before %s: what stands before it and since are two "
+                "recordings%s; solve each by itself",
+                step->of_target ? "target" : "camera", held ? "seems to have moved" : "moved",
+                1e3 * step->motion.head<3>().norm(), step->motion.tail<3>().norm() * 180 / M_PI,
+                names[step->first].c_str(), held ? ", or the robot errs by its place" : "");
+  tell_first(result, text, !held);
 }
 
 /// What errors that change smoothly with the robot's pose may have done, beside what scatters.
@@ -290,6 +317,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   tell_size_of_few(result, all, settings);
   tell_unseen(result, observations);
   tell_exchanged(result);
+  if (!axis) tell_step(result, all);
   result.size->estimate *= result.size_begun;
   result.size->sd *= result.size_begun;
   if (result.size->wanted) {

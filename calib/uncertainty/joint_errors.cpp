@@ -28,6 +28,17 @@ std::optional<JointErrors> joint_errors(const Bundle& bundle, const Unknowns& un
                      bundle.joint_error_sd.front()};
 }
 
+double second_order(const JointErrors& errors, const ArmModel& arm, double distance) {
+  double squares = 0;
+  Eigen::Index next = 0;
+  for (const Joint& joint : arm.chain.joints)
+    if (joint.kind != Joint::Kind::fixed) {
+      if (joint.kind == Joint::Kind::revolute) squares += std::pow(errors.estimate[next], 2);
+      ++next;
+    }
+  return 0.5 * squares * distance;
+}
+
 std::string direction_name(const Eigen::Vector3d& direction) {
   constexpr double kAlong = 0.9999;
   for (Eigen::Index i = 0; i < 3; ++i)

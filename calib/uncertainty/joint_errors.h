@@ -25,6 +25,10 @@ std::optional<JointErrors> joint_errors(const Bundle& bundle, const Unknowns& un
 /// A sentence of each that is farther off than was to be expected, the farthest first.
 std::vector<std::string> joints_far_off(const JointErrors& errors, const ArmModel& arm);
 
+/// By how much a gripper is off, at a distance from the base, that motions of first order in the zeros put
+/// there [m]: half of the squares of those turns.
+double second_order(const JointErrors& errors, const ArmModel& arm, double distance);
+
 /// "x", or the three numbers.
 std::string direction_name(const Eigen::Vector3d& direction);
 

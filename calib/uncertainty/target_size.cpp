@@ -81,8 +81,13 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings,
                      result.systematic.caution[target] * std::sqrt(free->covariance(column, column))};
     if (!size.far_off()) continue;
     const Vector6d apart = motion_between(bundle.cameras.front(), free->bundle.cameras.front());
-    const Matrix6d covariance = result.systematic.covariance.topLeftCorner<6, 6>();
-    result.disputed = result.disputed || apart.dot(covariance.ldlt().solve(apart)) > data::chi_square_95_of_6;
+    const Matrix6d covariance = result.systematic.covariance.topLeftCorner<6, 6>(),
+                   scatter = result.refined.covariance.topLeftCorner<6, 6>();
+    // A print that is off by so much is not that one, whatever hides in the robot's errors.
+    constexpr double kGross = 0.05;
+    const bool gross = std::abs(size.wanted->estimate - 1) > kGross;
+    const Matrix6d& bears = gross ? scatter : covariance;
+    result.disputed = result.disputed || apart.dot(bears.ldlt().solve(apart)) > data::chi_square_95_of_6;
   }
   return result;
 }

@@ -280,6 +280,50 @@ TEST(Pairs, WhoseTargetNoCameraSeesAreDoubted) {
   }
 }
 
+/// Of pairs in which the camera or the target moves by `mm` before one, what is said of it.
+std::string told_of_motion(std::vector<Observation> pairs, Mount setup, bool of_target, std::size_t before,
+                           double mm, bool& usable) {
+  const Eigen::Isometry3d D = make_pose({1e-3 * mm, 0, 0}, {2e-3, 0, 1e-3});
+  for (std::size_t i = before; i < pairs.size(); ++i) {
+    Eigen::Isometry3d& C = pairs[i].T_camera_target.front();
+    C = of_target ? Eigen::Isometry3d(C * D) : Eigen::Isometry3d(D * C);
+  }
+  const Calibration result = calibrate_pairs(setup, pairs);
+  usable = result.usable;
+  for (const std::string& warning : result.warnings)
+    if (warning.find(" moved by ") != std::string::npos) return warning;
+  return "";
+}
+
+// Knocks that leave two pairs and more on either side; of pairs that nothing moved in, none is claimed.
+TEST(Pairs, BetweenWhichTheCameraMovedAreNoAnswer) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const bool of_target : {false, true}) {
+      const std::vector<Observation> pairs = pairs_of(noisy_scene(setup, 0.3, 1.0, 31));
+      bool usable = false;
+      for (const std::size_t before : {std::size_t{3}, pairs.size() / 2, pairs.size() - 3}) {
+        const std::string told = told_of_motion(pairs, setup, of_target, before, 20, usable);
+        EXPECT_NE(told.find("before " + pairs[before].image + ":"), std::string::npos)
+            << to_string(setup) << of_target << before << told;
+        // Of halves the deviations grow until they hold both.
+        EXPECT_EQ(usable, before == pairs.size() / 2) << to_string(setup) << of_target << before;
+      }
+      EXPECT_EQ(told_of_motion(pairs, setup, of_target, pairs.size(), 20, usable), "");
+      EXPECT_TRUE(usable);
+    }
+}
+
+TEST(Pairs, InWhichNothingMovedClaimNoMotion) {
+  int claimed = 0;
+  bool usable = false;
+  for (unsigned seed = 101; seed < 141; ++seed) {
+    const Mount setup = seed % 2 ? Mount::eye_in_hand : Mount::eye_to_hand;
+    const std::vector<Observation> pairs = pairs_of(noisy_scene(setup, 0.3, 1.0, seed));
+    claimed += !told_of_motion(pairs, setup, false, pairs.size(), 0, usable).empty();
+  }
+  EXPECT_LE(claimed, 1);  // what gains 20 more than a hundred orders do is chance in fewer than one in 1,000
+}
+
 // Of a camera in the hand the target may stand before it either way; how far it is tells it.
 TEST(Pairs, ThatAreExchangedAreDoubtedByTheirDistances) {
   std::vector<Observation> pairs = pairs_of(noisy_scene(Mount::eye_in_hand, 0.3, 1.0, 31));
