@@ -16,10 +16,11 @@ struct StepOfPairs {
   double gain = 0;                     ///< fall of -2 log likelihood, less what its unknowns cost
 };
 
-/// What each pair by itself makes of X, beside `poses`, is taken as normal about one mean, or about one before a
-/// pair and another since, with one covariance (Hotelling 1931). A step costs log n an unknown (Schwarz 1978).
-/// It has to gain 20, and more than all but two of a hundred other orders of the pairs do. Likewise of Z: of the two
-/// the likelier. Empty where nothing moved, and of fewer than ten pairs, which do not tell a covariance.
+/// What each pair by itself makes of X, beside `poses`, is taken as normal about one mean, or about one
+/// before a pair and another since, with one covariance (Hotelling 1931). A step costs log n an unknown
+/// (Schwarz 1978). It has to gain 20, and more than all but two of a hundred other orders of the pairs do.
+/// Likewise of Z: of the two the likelier. Empty where nothing moved, and of fewer than ten pairs, which do
+/// not tell a covariance.
 std::optional<StepOfPairs> step_of_pairs(const std::vector<PoseLoop>& loops, const HandEyePoses& poses);
 
 }  // namespace flash::calib
