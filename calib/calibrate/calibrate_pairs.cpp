@@ -221,8 +221,8 @@ void tell_exchanged(Calibration& result) {
   tell_first(result, text, false);
 }
 
-/// A camera or a target that moved at once, of all pairs in their order. Where the stated deviations do not
-/// hold it, there is no answer.
+/// A camera or a target that moved at once, of all pairs in their order. Where it did so plainly, and the
+/// stated deviations do not hold it, there is no answer.
 void tell_step(Calibration& result, const std::vector<Observation>& all) {
   std::vector<PoseLoop> loops;
   std::vector<std::string> names;
@@ -234,7 +234,9 @@ void tell_step(Calibration& result, const std::vector<Observation>& all) {
   const auto step =
       step_of_pairs(resized(std::move(loops), result.size->estimate * result.size_begun), result.poses);
   if (!step) return;
-  const bool held = step->motion.dot(result.covariance.ldlt().solve(step->motion)) < data::chi_square_95_of_6;
+  constexpr double kPlain = 5;  // scatters: nothing else parts pairs so far
+  const bool held = step->distance < kPlain ||
+                    step->motion.dot(result.covariance.ldlt().solve(step->motion)) < data::chi_square_95_of_6;
   char text[300];
   std::snprintf(text, sizeof text,
                 "the %s %s by %.1f mm and %.2f deg before %s: what stands before it and since are two "

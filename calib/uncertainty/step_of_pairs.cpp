@@ -29,7 +29,13 @@ StepOfPairs likeliest_step(const Scatter& sequence, const Matrix6d& total) {
     const double of_two_means = within.ldlt().vectorD().array().log().sum();
     const double unknowns = 7;  // the motion, and when it was
     const double gain = n * (of_one_mean - of_two_means) - unknowns * std::log(n);
-    if (gain > best.gain) best = {.first = k, .motion = motion, .gain = gain};
+    if (gain <= best.gain) continue;
+    const Vector6d variances = within.diagonal() / (n - 2);
+    best = {.first = k,
+            .motion = motion,
+            .distance = std::max(motion.head<3>().norm() / std::sqrt(variances.head<3>().mean()),
+                                 motion.tail<3>().norm() / std::sqrt(variances.tail<3>().mean())),
+            .gain = gain};
   }
   return best;
 }

@@ -13,7 +13,9 @@ struct StepOfPairs {
   std::size_t first = 0;  ///< pair since the motion
   bool of_target = false;
   Vector6d motion = Vector6d::Zero();  ///< of X, or of the target's Z, right perturbation (dt, dtheta)
-  double gain = 0;                     ///< fall of -2 log likelihood, less what its unknowns cost
+  double distance =
+      0;            ///< of places or of turns, over the scatter of one pair (rms an axis): the larger of both
+  double gain = 0;  ///< fall of -2 log likelihood, less what its unknowns cost
 };
 
 /// What each pair by itself makes of X, beside `poses`, is taken as normal about one mean, or about one
