@@ -10,7 +10,8 @@ namespace flash::calib {
 
 /// Places in the text of XML, so that all else of a file can stay as it is.
 
-/// Throws data::InputError unless the text is XML whose root has this name. `path` is for messages.
+/// Throws data::InputError unless the text is XML of one element alone, which has this name. `path` is for
+/// messages.
 void parse_xml(const std::string& text, const std::string& path, const std::string& root,
                tinyxml2::XMLDocument& document);
 
