@@ -146,6 +146,8 @@ void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsi
                 unit, fixed(interval[0], 3).c_str(), fixed(interval[1], 3).c_str(),
                 errors->told(i) ? "" : " not told");
   };
+  std::printf("the gripper is what joint %s of the URDF carries%s\n", arm.chain.joints.back().name.c_str(),
+              extrinsics.inputs.tip_link.empty() ? " (--tip-link names another link)" : "");
   std::printf("joints are farther than they say by, with intervals of 95 %%:\n");
   Eigen::Index next = 0;
   for (const calib::Joint& joint : arm.chain.joints) {

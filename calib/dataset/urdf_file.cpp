@@ -65,6 +65,11 @@ std::map<std::string, Link> joints_of(const tinyxml2::XMLElement& robot, const s
   std::map<std::string, Link> carried;
   bool camera = false;
   for (const auto* node = robot.FirstChild(); node; node = node->NextSibling()) {
+    if (!camera && begins_with(*node, kCameraEndMark))
+      throw input_error(
+          path, "line " + std::to_string(node->GetLineNum()),
+          "found <!--" + std::string(node->Value()) +
+              "--> without the comment that begins it, expected both, or neither and no camera");
     camera = begins_with(*node, kCameraMark) || (camera && !begins_with(*node, kCameraEndMark));
     const tinyxml2::XMLElement* const element = node->ToElement();
     if (!element || element->Name() != std::string("joint")) continue;

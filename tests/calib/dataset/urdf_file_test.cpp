@@ -90,6 +90,10 @@ TEST_F(Urdf, CamerasThatWereExportedIntoItAreNoEndsOfTheArm) {
   const std::string path = write("seen.urdf", arm);
   EXPECT_EQ(load_urdf(path).joints.size(), links);
   EXPECT_EQ(load_urdf(path, "", "tool_camera").joints.size(), links + 1);
+  const std::string begin = "<!-- flash-calib: tool_camera -->";
+  arm.erase(arm.find(begin), begin.size());
+  EXPECT_NE(data::input_error_of([&] { load_urdf(write("half.urdf", arm)); }).find("expected both"),
+            std::string::npos);
 }
 
 TEST_F(Urdf, JointsBesideTheChainMayBeOfAnyKind) {
