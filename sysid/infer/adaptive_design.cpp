@@ -237,7 +237,8 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
   data::for_each_in_parallel(firsts * seconds, grid.threads, [&](std::size_t place) {
     const auto [first_value, second_value] = first_two(place, firsts, seconds, together);
     Shared& each = shared[first_value];
-    std::call_once(each.made, [&] { hold(all, axes[0].values[first_value], each.slices); });
+    const double value = axes[0].values[first_value];
+    std::call_once(each.made, [&] { hold(all, value, each.slices); });
     std::vector<Slices> held(axes.size());  // one an axis
     ReadMotions motions(emulator);
     std::vector<std::size_t> counts;
