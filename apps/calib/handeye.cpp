@@ -181,9 +181,8 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
     std::printf("  %-28s +- (%s, %s, %s) mm, (%s, %s, %s) deg\n", what, text(0).c_str(), text(1).c_str(),
                 text(2).c_str(), text(3).c_str(), text(4).c_str(), text(5).c_str());
   };
-  const bool of_arm = extrinsics.pixels || c.pose_errors;
-  deviations(of_arm ? "in the true frames" : "by scatter alone", c.covariance);
-  if (of_arm) deviations("repeatable in such poses", c.repeatable);
+  deviations("in the true frames", c.covariance);
+  deviations("repeatable in such poses", c.repeatable);
   if (c.use.value)
     std::printf("for %s: %s %.3g %s\n", calib::to_string(c.use.use), c.use.measure, *c.use.value, c.use.unit);
   const std::string corners =

@@ -16,6 +16,7 @@
 #include "apps/command_line/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/calibrate/cell.h"
+#include "calib/calibrate/cell_misfits.h"
 #include "calib/calibrate/cell_motion.h"
 #include "calib/detect/lens_doubt.h"
 #include "calib/detect/read_depth.h"
@@ -248,14 +249,13 @@ void expect_different(const Recording& one, const Recording& other) {
 
 /// Pictures of several cameras that have one number are of one pose. Those that are not count by themselves.
 void warn_of_numbers(const Recording& one, const Recording& other, Doubts& doubts) {
-  constexpr double kSame = 1e-6;
   std::size_t common = 0, apart = 0;
   double farthest = 0;  // [m]
   for (const calib::Frame& a : one.dataset.frames)
     for (const calib::Frame& b : other.dataset.frames) {
       if (a.stamp != b.stamp) continue;
       ++common;
-      if (a.T_base_gripper.isApprox(b.T_base_gripper, kSame)) continue;
+      if (calib::same_pose(a.T_base_gripper, b.T_base_gripper)) continue;
       ++apart;
       farthest = std::max(farthest, (a.T_base_gripper.translation() - b.T_base_gripper.translation()).norm());
     }

@@ -98,10 +98,10 @@ struct Calibration {
   std::optional<PlaceAlong> along;  ///< of a robot that turns about one axis, or nearly
   WeakestDirection weakest;
   std::optional<TargetSize> size;
-  double size_begun = 1;           ///< of the target over the stated one, with which the solution began
-  std::vector<SplitCheck> splits;  ///< of X, interleaved first; none where there are too few views
-  double covariance_factor = 1;    ///< by which the splits have widened the covariance
-  std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found
+  double size_begun = 1;             ///< of the target over the stated one, with which the solution began
+  std::vector<SplitCheck> splits;    ///< of X, interleaved first; none where there are too few views
+  double covariance_factor = 1;      ///< by which the splits have widened the covariance
+  CorrelatedPoseErrors pose_errors;  ///< of the robot, which the covariance holds
   std::optional<KnockedPart> other_part;
   std::optional<Drift> drift;         ///< the answer is of where camera and target were at the last view
   std::vector<std::string> warnings;  ///< worst first

@@ -249,16 +249,16 @@ void tell_step(Calibration& result, const std::vector<Observation>& all) {
 
 /// What errors that change smoothly with the robot's pose may have done, beside what scatters.
 void add_smooth_errors(Calibration& result, const std::vector<Observation>& observations,
-                       const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit) {
+                       const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit,
+                       const std::optional<AlongPrior>& along) {
   std::vector<Eigen::Isometry3d> poses;
   for (const Observation& observation : observations) poses.push_back(observation.T_base_gripper);
-  const auto smooth = smooth_errors_of_pairs(result.setup, poses, loops, fit,
-                                             {result.repeatable, result.size->sd, result.size->prior_sd});
-  if (!smooth) return;
-  result.pose_errors = smooth->arm;
-  result.covariance = smooth->covariance;
+  const SmoothErrorsOfPairs smooth = smooth_errors_of_pairs(
+      result.setup, poses, loops, fit, {result.repeatable, result.size->sd, result.size->prior_sd}, along);
+  result.pose_errors = smooth.arm;
+  result.covariance = smooth.covariance;
   raise_to(result.repeatable, result.covariance);
-  result.size->sd = std::max(result.size->sd, smooth->size_sd);
+  result.size->sd = std::max(result.size->sd, smooth.size_sd);
   tell_smooth_errors(result, growth(result.repeatable, result.covariance));
 }
 
@@ -312,7 +312,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .held_out = result.held_out});
   if (result.size->sd > 0)
     result.repeatable = result.covariance += covariance_of_size(loops, fit.poses, along, result.size->sd);
-  if (!axis) add_smooth_errors(result, observations, loops, fit);
+  add_smooth_errors(result, observations, loops, fit, along);
   check_halves(result, loops, places, along);
   finish(result, observations);
   tell_size(result, loops, along, settings);
@@ -327,11 +327,6 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
     result.size->wanted->sd *= result.size_begun;
   }
   restore_size(result);
-  if (!result.pose_errors)
-    result.warnings.emplace_back(
-        "so few pairs of poses, or turns about one axis, tell the scatter alone: what the errors of an arm's "
-        "model have in common is "
-        "not in the stated standard deviations");
   if (compared.size() < loops.size())
     result.warnings.push_back("other methods are compared on " + std::to_string(compared.size()) + " of " +
                               std::to_string(loops.size()) + " pairs, evenly spread");

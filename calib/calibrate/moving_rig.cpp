@@ -208,7 +208,7 @@ TimedPoses timed_poses(const Calibration& result, const std::vector<Observation>
   TimedPoses poses;
   poses.refined = result.refined;
   poses.used = result.used.size();
-  poses.shared = std::sqrt(result.pose_errors->share) * result.pose_errors->rotation;
+  poses.shared = std::sqrt(result.pose_errors.share) * result.pose_errors.rotation;
   for (const int view : result.used) poses.time.push_back(time[static_cast<std::size_t>(view)]);
   const int count = static_cast<int>(views.size());
   for (int k = 0; k < count; ++k) {
@@ -270,11 +270,7 @@ Calibration solve_knocked(const Calibration& whole, const Knock& knock, std::siz
 Calibration calibrate_moving(const std::vector<Observation>& all, const Eigen::Matrix3Xd& points,
                              const StillSolver& solve) {
   Calibration whole = solve(all);
-  if (!whole.pose_errors) {
-    doubt_last_views(whole, all, std::nullopt);
-    return whole;
-  }
-  const double rival = whole.pose_errors->gain;
+  const double rival = whole.pose_errors.gain;
   const BundleSettings settings = judged_with(whole);
   const std::optional<Knock> knock = find_knock(whole.refined, settings, rival);
   const std::optional<Drift> drift = drift_of(whole, rival);

@@ -65,7 +65,7 @@ void raise_to(const Matrix6d& least, Matrix6d& covariance) {
 
 void tell_smooth_errors(Calibration& result, double grown) {
   constexpr double kTold = 1.5;  // of the deviations
-  if (!result.pose_errors->found || grown < kTold * kTold) return;
+  if (!result.pose_errors.found || grown < kTold * kTold) return;
   char text[320];
   std::snprintf(
       text, sizeof text,

@@ -222,16 +222,14 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                {"target_pose", to_json(extrinsics.target_pose)},
                {"covariance", rows(calibration.covariance)}};
   const ToldDeviations sd = told_deviations(calibration, calibration.covariance, Axes::camera),
-                       in_parent = told_deviations(calibration, calibration.covariance, Axes::parent);
+                       in_parent = told_deviations(calibration, calibration.covariance, Axes::parent),
+                       here = told_deviations(calibration, calibration.repeatable, Axes::parent);
   json["predicted_sd"] = {{"translation_mm", to_json(sd, false)},
                           {"rotation_deg", to_json(sd, true)},
                           {"translation_parent_mm", to_json(in_parent, false)},
-                          {"rotation_parent_deg", to_json(in_parent, true)}};
-  if (extrinsics.pixels || calibration.pose_errors) {
-    const ToldDeviations here = told_deviations(calibration, calibration.repeatable, Axes::parent);
-    json["predicted_sd"]["repeatable_parent_mm"] = to_json(here, false);
-    json["predicted_sd"]["repeatable_parent_deg"] = to_json(here, true);
-  }
+                          {"rotation_parent_deg", to_json(in_parent, true)},
+                          {"repeatable_parent_mm", to_json(here, false)},
+                          {"repeatable_parent_deg", to_json(here, true)}};
   json["one_axis"] = calibration.along ? along_json(*calibration.along, calibration.poses) : Json(nullptr);
   const auto px = [&](double value) { return extrinsics.pixels ? Json(value) : Json(nullptr); };
   const auto sight = [&](double SightNoise::*part) {
@@ -318,13 +316,10 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                                {"moved_deg", list(Eigen::Vector3d(kDegrees * motion.tail<3>()))}};
   }
   add_joint_errors(calibration, extrinsics, json);
-  json["smooth_errors"] = nullptr;
-  if (calibration.pose_errors) {
-    const CorrelatedPoseErrors& errors = *calibration.pose_errors;
-    json["smooth_errors"] = {{"found", errors.found},           {"gain", errors.gain},
-                             {"share", errors.share},           {"translation_m", errors.translation},
-                             {"rotation_rad", errors.rotation}, {"reach", errors.reach}};
-  }
+  const CorrelatedPoseErrors& errors = calibration.pose_errors;
+  json["smooth_errors"] = {{"found", errors.found},           {"gain", errors.gain},
+                           {"share", errors.share},           {"translation_m", errors.translation},
+                           {"rotation_rad", errors.rotation}, {"reach", errors.reach}};
   json["warnings"] = calibration.warnings;
   json["exit_code"] = exit_code;
   json["provenance"] = {{"tool", "flash-calib"},    {"version", FLASH_VERSION}, {"dataset", inputs.dataset},

@@ -151,11 +151,10 @@ Json outline(const Eigen::Matrix3Xd& points) {
 Json sd_in_parent(const Calibration& calibration) {
   const ToldDeviations sd = told_deviations(calibration, calibration.covariance, Axes::parent),
                        here = told_deviations(calibration, calibration.repeatable, Axes::parent);
-  Json json = {{"mm", to_json(sd, false)}, {"deg", to_json(sd, true)}};
-  if (!has_pixels(calibration) && !calibration.pose_errors) return json;
-  json["repeatable_mm"] = to_json(here, false);
-  json["repeatable_deg"] = to_json(here, true);
-  return json;
+  return {{"mm", to_json(sd, false)},
+          {"deg", to_json(sd, true)},
+          {"repeatable_mm", to_json(here, false)},
+          {"repeatable_deg", to_json(here, true)}};
 }
 
 std::string sentence(const char* format, double value, double other = 0) {

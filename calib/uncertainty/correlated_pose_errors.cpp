@@ -13,14 +13,14 @@ namespace flash::calib {
 namespace {
 
 constexpr int kOwn = PoseModes::kOwn, kModes = PoseModes::kSmooth;
-// Of the rms distance between two poses, and how likely each is of drawn arms (make arm-errors).
+// [rad], and how likely each is of drawn arms (make arm-errors).
 struct Reach {
   double length, probability;
 };
-constexpr Reach kReaches[] = {{1, 0.05}, {2, 0.2}, {4, 0.4}, {8, 0.35}};
+constexpr Reach kReaches[] = {{1, 0.05}, {2, 0.25}, {4, 0.45}, {8, 0.25}};
 // Turns [rad], a factor of two apart: 0.01 to 0.7 deg.
 constexpr double kSizes[] = {2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 1.28e-2};
-constexpr double kUsualSize = 0.1 * M_PI / 180, kSizeSpread = 1;  // of its logarithm
+constexpr double kUsualSize = 0.15 * M_PI / 180, kSizeSpread = 1;  // of its logarithm
 // Of errors that are smooth against errors that are not, before any view is seen: arms repeat to a tenth of
 // their accuracy (ISO 9283 states both), so that nearly every one has them.
 constexpr double kOdds = 9;
@@ -201,7 +201,7 @@ std::vector<Candidate> candidates(const std::vector<PoseModes>& modes, const See
              M[1]);
   const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(n, n);
   const double independent = fit_variances(seen.beta, I, M, unit).deviance;
-  const Eigen::MatrixXd squared = squared_distances(modes, noise.translation2, noise.rotation2);
+  const Eigen::MatrixXd squared = squared_distances(modes);
   std::vector<Candidate> list;
   for (const auto& [reach, probability] : kReaches) {
     const Eigen::MatrixXd k = matern(squared, reach);
@@ -232,9 +232,9 @@ std::vector<Candidate> candidates(const std::vector<PoseModes>& modes, const See
 /// Covariance of the errors of these poses over all candidates; independent ones are widened by how well they
 /// are known.
 Eigen::MatrixXd field_covariance(const std::vector<PoseModes>& modes, const std::vector<Candidate>& list,
-                                 const Noise& noise, CorrelatedPoseErrors& errors) {
+                                 CorrelatedPoseErrors& errors) {
   const auto n = static_cast<Eigen::Index>(modes.size());
-  const Eigen::MatrixXd squared = squared_distances(modes, noise.translation2, noise.rotation2);
+  const Eigen::MatrixXd squared = squared_distances(modes);
   Eigen::Vector2d independent = Eigen::Vector2d::Zero();
   Eigen::MatrixXd k = Eigen::MatrixXd::Zero(n, n);  // times the squares of the sizes
   double squares = 0;
@@ -282,7 +282,7 @@ ArmErrorFit fit_arm_errors(const std::vector<PoseModes>& modes, const std::vecto
   const std::vector<Candidate> list =
       candidates(some, seen_errors(parts, prior), {noise[0], noise[1]}, fit.errors);
   fit.errors.found = fit.errors.gain > kOnceInTwenty;
-  fit.covariance = field_covariance(modes, list, {noise[0], noise[1]}, fit.errors);
+  fit.covariance = field_covariance(modes, list, fit.errors);
   return fit;
 }
 
@@ -296,7 +296,7 @@ PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& 
   if (settings.unknowns.joint_errors) return model;
   for (std::size_t arm = 0; arm < model.arms.size(); ++arm) {
     model.poses[arm] = poses_of(all, refined.bundle, arm);
-    if (model.poses[arm].size() < kFewestPosesOfArm) continue;
+    if (model.poses[arm].empty()) continue;
     std::vector<PoseInformation> seen;
     for (const std::size_t i : model.poses[arm]) seen.push_back(all[i]);
     ArmErrorFit fit = fit_arm_errors(

@@ -17,18 +17,16 @@ struct CorrelatedPoseErrors {
   double share = 0;        ///< probability that there are any
   double rotation = 0;     ///< standard deviation per axis of turns at the wrist and about the base [rad],
   double translation = 0;  ///< and of shifts [m]
-  double reach = 0;        ///< length over which they agree, over the rms distance between two poses
+  double reach = 0;        ///< over which they agree [rad], see squared_distances
 };
 
 /// Errors of the poses of each arm: a mean over all that was tried, by its probability.
 struct PoseErrorModel {
   std::vector<CorrelatedPoseErrors> arms;
   std::vector<std::vector<std::size_t>> poses;  ///< of each arm, those that were seen
-  /// Of their errors (base axes, at the gripper), six a pose, times `share`; empty: too few poses to tell.
+  /// Of their errors (base axes, at the gripper), six a pose, times `share`; empty: no pose was seen.
   std::vector<Eigen::MatrixXd> covariance;
 };
-
-constexpr std::size_t kFewestPosesOfArm = 8;  ///< from which anything is told of them
 
 /// Of one arm, from what its poses' errors are seen to be. prior: of the shared unknowns. noise: variances an
 /// axis of errors that are independent, of translation and of rotation, in units of the modes' columns.

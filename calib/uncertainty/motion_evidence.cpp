@@ -30,8 +30,7 @@ MotionEvidence::MotionEvidence(const Refinement& refined, const BundleSettings& 
   std::vector<std::size_t> all(seen_.size());
   std::iota(all.begin(), all.end(), 0);
   const std::vector<PoseModes> modes = modes_of(refined.bundle, all);
-  squared_ = squared_distances(modes, std::pow(refined.noise.translation.front(), 2),
-                               std::pow(refined.noise.rotation.front(), 2));
+  squared_ = squared_distances(modes);
   root_.resize(kOwn * n, kOwn);
   rotation_ = translation_ = root_;
   fields_.setZero(kOwn * n, kOwn * n);

@@ -12,7 +12,7 @@ namespace flash::calib {
 struct ArmErrorLevel {
   double rotation = 0, translation = 0;  ///< of independent errors, standard deviations an axis [rad], [m]
   double smooth = 0;                     ///< of turns by fields [rad]
-  double reach = 1;                      ///< of the fields, over the rms distance between two poses
+  double reach = 1;                      ///< of the fields [rad], see squared_distances
 };
 
 /// The linearised solution asked of motions of camera or target, all errors of the arm and all shared

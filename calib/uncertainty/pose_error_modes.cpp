@@ -1,6 +1,5 @@
 #include "calib/uncertainty/pose_error_modes.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "calib/geometry/pose.h"
@@ -49,20 +48,16 @@ std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::siz
   return modes;
 }
 
-Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes, double place_noise,
-                                  double attitude_noise) {
-  constexpr double kLeast = 100 * 6;  // of the variance; two places differ by six of them
+Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes) {
   const auto count = static_cast<Eigen::Index>(modes.size());
-  Eigen::MatrixXd place = Eigen::MatrixXd::Zero(count, count), attitude = place;
+  Eigen::MatrixXd squared(count, count);
   for (Eigen::Index i = 0; i < count; ++i)
     for (Eigen::Index j = 0; j < count; ++j) {
       const PoseModes &a = modes[static_cast<std::size_t>(i)], &b = modes[static_cast<std::size_t>(j)];
-      place(i, j) = (a.place - b.place).squaredNorm();
-      attitude(i, j) = 0.5 * (a.attitude - b.attitude).squaredNorm();
+      squared(i, j) = (a.place - b.place).squaredNorm() / (kReach * kReach) +
+                      0.5 * (a.attitude - b.attitude).squaredNorm();
     }
-  const double pairs = static_cast<double>(count) * static_cast<double>(count - 1);
-  return place / std::max({place.sum() / pairs, kLeast * place_noise, 1e-12}) +
-         attitude / std::max({attitude.sum() / pairs, kLeast * attitude_noise, 1e-12});
+  return squared;
 }
 
 Eigen::MatrixXd matern(const Eigen::MatrixXd& squared, double reach) {

@@ -25,13 +25,11 @@ PoseModes modes_at(const Eigen::Isometry3d& T_base_gripper, const Eigen::Vector3
 /// Of some poses of a bundle.
 std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::size_t>& poses);
 
-/// Squared distances of places and of attitudes (chordal, so that a kernel of both is positive), each over
-/// its mean. The places are those reported, errors and all: spreads of less than ten times the noise
-/// (variances an axis) tell nothing of where the robot was, as those of a head that only turns.
-Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes, double place_noise,
-                                  double attitude_noise);
+/// Squared distances of poses [rad]: of attitudes (chordal, so that a kernel is positive) and of places over
+/// the arm's reach. Joints turn by that between them, however far apart a recording's poses are.
+Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes);
 
-/// Matern 5/2 of poses at those distances (Rasmussen and Williams 2006).
+/// Matern 5/2 of poses at those distances (Rasmussen and Williams 2006). reach [rad]
 Eigen::MatrixXd matern(const Eigen::MatrixXd& squared, double reach);
 
 }  // namespace flash::calib

@@ -29,10 +29,10 @@ Matrix6d scatter_columns(const LinearLoop& linear, const PoseSpaceFit& fit) {
 
 }  // namespace
 
-std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
-    Setup setup, const std::vector<Eigen::Isometry3d>& T_base_gripper, const std::vector<PoseLoop>& loops,
-    const PoseSpaceFit& fit, const ScatterOfPairs& scatter) {
-  if (loops.size() < kFewestPosesOfArm) return std::nullopt;
+SmoothErrorsOfPairs smooth_errors_of_pairs(Setup setup, const std::vector<Eigen::Isometry3d>& T_base_gripper,
+                                           const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit,
+                                           const ScatterOfPairs& scatter,
+                                           const std::optional<AlongPrior>& along) {
   const Eigen::Index poses = 12, s = poses + (scatter.size_sd > 0 ? 1 : 0);
   // Of the variance of a pair's scatter: the rest is estimated beside each field.
   constexpr double kKnown = 0.01;
@@ -44,6 +44,12 @@ std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
     middle += T.translation() / static_cast<double>(T_base_gripper.size());
   Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(s + 1, s + 1);
   if (s > poses) prior(poses, poses) = std::pow(scatter.size_prior, -2);
+  if (along) {
+    const AlongResidual known = along_residual(*along, along->target ? fit.poses.Z : fit.poses.X);
+    const Eigen::Index at = along->target ? 6 : 0;
+    prior.block<6, 6>(at, at) += known.by_pose.transpose() * known.by_pose;
+    prior.block<6, 1>(at, s) += known.by_pose.transpose() * known.value;
+  }
   std::vector<PoseModes> modes;
   std::vector<PoseInformation> seen;
   Eigen::MatrixXd information = prior.topLeftCorner(s, s),

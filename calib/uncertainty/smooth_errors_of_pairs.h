@@ -23,9 +23,10 @@ struct ScatterOfPairs {
 
 /// As systematic_uncertainty() has it of pictures. The scatter of a pair, of robot and camera together,
 /// counts as what is independent; its levels are estimated anew beside each field. T_base_gripper: of each
-/// loop. None where there are too few.
-std::optional<SmoothErrorsOfPairs> smooth_errors_of_pairs(
-    Setup setup, const std::vector<Eigen::Isometry3d>& T_base_gripper, const std::vector<PoseLoop>& loops,
-    const PoseSpaceFit& fit, const ScatterOfPairs& scatter);
+/// loop. along: what the fit was made with.
+SmoothErrorsOfPairs smooth_errors_of_pairs(Setup setup, const std::vector<Eigen::Isometry3d>& T_base_gripper,
+                                           const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit,
+                                           const ScatterOfPairs& scatter,
+                                           const std::optional<AlongPrior>& along = {});
 
 }  // namespace flash::calib

@@ -18,9 +18,9 @@ ARMS = {
                ((0.088, 0, 0), (0, 0, -1))], (0, 0, -0.107), (0, -0.3, 0, -2.2, 0, 2.0, 0.8))}
 # Standard deviations of zeros [deg], links [mm], axes [deg] and of a harmonic of each gear [deg].
 ERRORS = ((0.05, 0.3, 0, 0), (0.1, 0.5, 0, 0), (0.1, 0.2, 0.05, 0.05), (0.2, 0.5, 0.1, 0.1))
-SPREADS = (0.4, 0.6)  # of the joints, either way [rad]
+SPREADS = (0.05, 0.1, 0.2, 0.4, 0.6, 0.9)  # of the joints, either way [rad]
 NOISES = (2e-5, 2e-4)  # independent errors [m, rad]
-REACHES = (0.25, 0.5, 1, 2, 4, 8, 16)  # of the rms distance between two poses
+REACHES = (0.25, 0.5, 1, 2, 4, 8, 16, 32)  # [rad], places over BASE_AWAY
 SIZES = tuple(1e-4 * 2 ** k for k in range(9))  # turns [rad]
 BASE_AWAY = 0.6  # [m]
 VIEWS = 16
@@ -68,7 +68,7 @@ def field_covariances(poses):
     """Of fields of unit size, by reach."""
     rotations, places = numpy.array([R for R, _ in poses]), numpy.array([t for _, t in poses])
     apart = ((places[:, None] - places) ** 2).sum(-1), 0.5 * ((rotations[:, None] - rotations) ** 2).sum((-1, -2))
-    squared = sum(each / (each.sum() / (VIEWS * (VIEWS - 1))) for each in apart)
+    squared = apart[0] / BASE_AWAY ** 2 + apart[1]
     I, O = numpy.eye(3), numpy.zeros((3, 3))
     stretch = [numpy.column_stack([0.5 * p, O[:, :2]]) for p in places - places.mean(0)]
     modes = [[numpy.vstack(pair) for pair in ((O, R), (-cross_matrix(p), I), (BASE_AWAY * math.sqrt(2 / 3 + 1 / 4 + 1 / 12) * I, O),
@@ -98,7 +98,7 @@ def probabilities(poses, errors, noise):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--arms", type=int, default=12, help="drawn of each kind")
+    parser.add_argument("--arms", type=int, default=8, help="drawn of each kind")
     options = parser.parse_args()
     random = numpy.random.default_rng(options.seed)
     print("| arm | joints either way rad | zeros deg, links mm, axes deg, gears deg | " + " | ".join(f"reach {r:g}" for r in REACHES) + " | size deg |")

@@ -50,7 +50,7 @@ TEST(PanTilt, FortyPicturesWithDepthAreSolvedAndTheWeakestDirectionIsNamed) {
   // How the camera is turned about the pan axis, its own y, only the tilts tell, which are the smaller turns:
   // an error e shows as e times their sine, 0.17 / sqrt(2) rms, under the robot's noise of each view.
   const WeakestDirection weakest =
-      weakest_direction(result.refined.covariance.topLeftCorner<6, 6>(), 0.5, "camera");
+      weakest_direction(result.refined.covariance.topLeftCorner<6, 6>(), 0.8, "camera");
   EXPECT_TRUE(weakest.name.starts_with("rotation about")) << weakest.name;
   EXPECT_GT(weakest.direction.tail<3>().normalized().cwiseAbs().y(), 0.95) << weakest.name;
   const double expected = settings.robot_deg * M_PI / 180 / (0.17 / std::sqrt(2.0) * std::sqrt(40.0));

@@ -73,19 +73,22 @@ TEST(CorrelatedPoseErrors, OfAWrongKinematicModelAreFoundAndMostlyCovered) {
   EXPECT_GE(covered, 11);  // as a share of three quarters leaves in 98 of 100 sets of twenty
 }
 
-/// Errors of translation that agree over places: a Gaussian field drawn by the Cholesky factor of exp(-d^2 /
-/// 2).
+/// Errors of translation that agree over turns of joints [rad]: a Gaussian field drawn by the Cholesky factor
+/// of exp(-d^2 / 2).
 void add_field(HandEyeScene& scene, double size, double length, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   const auto count = static_cast<Eigen::Index>(scene.observations.size());
-  const auto place = [&](Eigen::Index i) {
-    return scene.observations[static_cast<std::size_t>(i)].T_base_gripper.translation();
+  const auto squared = [&](Eigen::Index i, Eigen::Index j) {
+    const Eigen::Isometry3d &a = scene.observations[static_cast<std::size_t>(i)].T_base_gripper,
+                            &b = scene.observations[static_cast<std::size_t>(j)].T_base_gripper;
+    constexpr double kArm = 0.6;  // [m]
+    return 0.5 * (a.linear() - b.linear()).squaredNorm() +
+           (a.translation() - b.translation()).squaredNorm() / (kArm * kArm);
   };
   Eigen::MatrixXd K = 1e-9 * Eigen::MatrixXd::Identity(count, count);
   for (Eigen::Index i = 0; i < count; ++i)
-    for (Eigen::Index j = 0; j < count; ++j)
-      K(i, j) += std::exp(-0.5 * (place(i) - place(j)).squaredNorm() / (length * length));
+    for (Eigen::Index j = 0; j < count; ++j) K(i, j) += std::exp(-0.5 * squared(i, j) / (length * length));
   const Eigen::MatrixXd white = Eigen::MatrixXd::NullaryExpr(count, 3, [&] { return normal(random); });
   const Eigen::MatrixXd field = size * Eigen::MatrixXd(K.llt().matrixL()) * white;
   for (Eigen::Index i = 0; i < count; ++i)
@@ -93,12 +96,12 @@ void add_field(HandEyeScene& scene, double size, double length, unsigned seed) {
 }
 
 TEST(CorrelatedPoseErrors, AFieldThatWasDrawnIsFoundAndCovered) {
-  // 3 mm over 0.3 m, half as long again as the mean distance of two poses is. 40 trials: 38 are inside where
+  // 3 mm over 1 rad, about the mean distance of two poses. 40 trials: 38 are inside where
   // sizes are known; they are estimated from a handful of modes that can be seen.
   int found = 0, by_noise = 0, covered = 0;
   for (unsigned seed = 201; seed <= 240; ++seed) {
     HandEyeScene scene = make_scene(noisy(), tag_points(), seed);
-    add_field(scene, 3e-3, 0.3, seed);
+    add_field(scene, 3e-3, 1, seed);
     const Refinement solution = refined(scene);
     const SystematicUncertainty systematic = uncertainty_of(solution);
     found += systematic.arms.front().found;

@@ -31,9 +31,7 @@ double brute_deviance(const Refinement& refined, const BundleSettings& settings,
   std::vector<std::size_t> all(seen.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   const std::vector<PoseModes> modes = modes_of(refined.bundle, all);
-  const Eigen::MatrixXd k = matern(squared_distances(modes, std::pow(refined.noise.translation.front(), 2),
-                                                     std::pow(refined.noise.rotation.front(), 2)),
-                                   level.reach);
+  const Eigen::MatrixXd k = matern(squared_distances(modes), level.reach);
   const auto n = static_cast<Eigen::Index>(seen.size()), s = seen.front().H_ss.rows();
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(6 * n, 6 * n), H = Eigen::MatrixXd::Zero(6 * n + s, 6 * n + s);
   Eigen::VectorXd g = Eigen::VectorXd::Zero(6 * n + s);
