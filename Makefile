@@ -29,7 +29,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study link-length-study use-study watch-study held-out arm-errors
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
-.PHONY: tours examples container container-test pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
+.PHONY: tours examples constants container container-test pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -52,6 +52,9 @@ tours: build  ## Packages, build, then the commands of Start and of both tours, 
 examples: configure-test  ## Draw the recordings in examples/ anew, by the commands of their README
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid flash-calib rendered_dataset
 	$(PYTHON) tests/documents/examples_test.py --bin $(BUILD)/bin --draw $(BUILD)/tests/rendered_dataset --write
+
+constants:  ## Put the table of the estimator's constants into docs/experiments.md, by the comments of the sources
+	$(PYTHON) tests/documents/constants.py --write
 
 # The image has the version as its tag. ENGINE is docker, podman or buildah; CONTAINER_ARGS='--build-arg CUDA=ON' is for NVIDIA devices.
 container:  ## An image of programs, Python package and examples, by docker, podman or buildah: flash:VERSION

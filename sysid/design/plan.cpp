@@ -39,7 +39,8 @@ struct Before {
 
 /// `whole`: that of both, `common`: standard deviations, of one error.
 Before divided(const Eigen::MatrixXd& whole, Eigen::VectorXd common) {
-  constexpr double kMost = 0.99;  // share of a variance that is common: draws are few, and may show less
+  // Share of a variance that is common: draws are few, and may show less. Work: keeps what is left positive.
+  constexpr double kMost = 0.99;
   const double share = common.dot(whole.llt().solve(common));
   if (share > kMost) common *= std::sqrt(kMost / share);
   const Eigen::MatrixXd of_common = common * common.transpose();
@@ -56,7 +57,7 @@ PlannedExperiment planned(const std::string& name, const Before& before, const E
 
 Eigen::MatrixXd covariance_before(const PlanSettings& settings) {
   if (settings.known) {
-    constexpr double kSure = 1e-9;  // of a coordinate: what draws do not differ in
+    constexpr double kSure = 1e-9;  // Of a coordinate: what draws do not differ in. Work: rounding.
     Eigen::MatrixXd covariance = settings.known->covariance;
     covariance.diagonal().array() += kSure * kSure;
     return covariance;
@@ -110,7 +111,9 @@ Asked with_held(const PlanSettings& settings, const std::vector<double>& at,
 Eigen::MatrixXd errors_of_solution(const Replay& replay, const LinearObservations& places,
                                    const ReplayResult& motion, const ReplayCandidate& candidate,
                                    const MotionStore& store) {
-  constexpr double kMesh = 2.0 / 3;  // of the step to half the cell: an error of second order
+  // Of the step to half the cell. Theory: an error of second order ends at 4/3 of it, half of which is
+  // unsure.
+  constexpr double kMesh = 2.0 / 3;
   const Eigen::VectorXd own = places.displacements(replay, motion.motion);
   std::vector<Eigen::VectorXd> columns;
   const auto add = [&](double share, const Replay& finer, const ReplayResult& there) {
@@ -149,7 +152,7 @@ ObservedRows rows_of(const Replay& replay, const LinearObservations& places,
 /// one of its own beside it, by the middles of the quarters of an exponential distribution.
 std::vector<std::pair<Misfit, double>> misfits_to_come(const Misfit& found) {
   std::vector<std::pair<Misfit, double>> all = {{found, 0.5}};
-  constexpr int kParts = 4;
+  constexpr int kParts = 4;  // Of an exponential distribution. Work: points of a quadrature.
   for (int part = 0; part < kParts; ++part) {
     const double beyond = -std::log(1 - (part + 0.5) / kParts) * usual_discrepancy * found.rough;
     all.emplace_back(found, 0.5 / kParts);

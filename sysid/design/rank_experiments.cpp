@@ -13,8 +13,9 @@ namespace {
 
 /// The sheet of a recording on cells as large as rank_experiments takes.
 data::Recording with_few_vertices(const data::Recording& recording) {
+  // Vertices of an experiment that is ranked. Chosen: by what a ranking costs; not varied.
   constexpr Eigen::Index kMost = 500;
-  constexpr double kFolds = 2;  // of a cell
+  constexpr double kFolds = 2;  // Of a cell, until there are few vertices. Work.
   data::Recording coarse = recording;
   while (coarse.mesh.vertices.rows() > kMost) {
     const std::string specification = scaled_cell(coarse.mesh_spec, kFolds);

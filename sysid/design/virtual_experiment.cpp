@@ -28,7 +28,7 @@ struct ScratchFolder {
   std::string path = (fs::temp_directory_path() / "flash-plan-XXXXXX").string();
 };
 
-constexpr double kMotion = 2.0;  // of the gripper [s]
+constexpr double kMotion = 2.0;  // Of the gripper [s]. Chosen: not varied.
 
 /// From the front and from behind, aimed a little above the middle of a sheet of that size.
 std::vector<SynthCamera> two_cameras(const Eigen::Vector3d& target, double size) {

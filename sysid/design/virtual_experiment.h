@@ -11,7 +11,7 @@ namespace flash::sysid {
 inline constexpr std::array<const char*, 5> virtual_experiments = {"corner_lift", "hang", "bar_pull",
                                                                    "bias_pull", "drag"};
 
-/// What the longest of them takes [s].
+/// What the longest of them takes [s]. Work: for the check of a step.
 inline constexpr double longest_virtual_experiment = 3.0;
 
 struct VirtualExperimentSettings {

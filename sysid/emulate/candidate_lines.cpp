@@ -7,7 +7,7 @@
 namespace flash::sysid {
 namespace {
 
-constexpr std::size_t kDigits = 16;
+constexpr std::size_t kDigits = 16;  // Hexadecimal digits of a sum. Work.
 
 std::string joined(const std::vector<std::string>& words) {
   std::string text;

@@ -225,7 +225,7 @@ void add_score(const ScoreSettings& score, Fingerprint& print) {
 
 Fingerprint fingerprint(const std::vector<Replay>& replays, const GridSettings& settings) {
   Fingerprint print;
-  constexpr std::size_t kShort = 12;  // digits, for people
+  constexpr std::size_t kShort = 12;  // Digits, for people. Work.
   print["program"] = std::string(FLASH_VERSION) + ", sources " +
                      std::string(source_digest::motions().substr(0, kShort)) + " " +
                      std::string(source_digest::scores().substr(0, kShort));

@@ -5,7 +5,7 @@
 
 namespace flash::sysid {
 
-/// Points of a grid of which all are emulated.
+/// Points of a grid of which all are emulated. Work: about what fewer tell, the answer simulates anew.
 inline constexpr std::size_t most_emulated = 600;
 
 /// The values of a large search that its answer begins with, so that the work does not grow with the grid.

@@ -31,6 +31,8 @@ std::vector<Eigen::Vector3d> places_within(int parts) {
 }  // namespace
 
 MeshProjection projection(const data::TriangleMesh& from, const data::TriangleMesh& to) {
+  // Of an edge, over which a surface is averaged. Work: points of a quadrature; meshes differ by a factor of
+  // 4 at most.
   constexpr double kMostParts = 4;
   const double ratio = data::edge_lengths(to).mean / data::edge_lengths(from).mean;
   const std::vector<Eigen::Vector3d> places =

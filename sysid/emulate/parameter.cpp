@@ -12,8 +12,8 @@ using data::SolidMaterial;
 using data::Weave;
 using Of = Parameter::Of;
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kTiny = std::numeric_limits<double>::min();
+constexpr double kPi = 3.14159265358979323846;                // Half a turn [rad]. Work: bounds of angles.
+constexpr double kTiny = std::numeric_limits<double>::min();  // Above zero. Work.
 
 using Access = ParameterAccess;
 

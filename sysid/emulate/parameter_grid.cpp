@@ -202,7 +202,7 @@ void check_axes(const std::vector<Axis>& axes, const MaterialBase& base) {
     young = young || (axes[i].name == "young" && axes[i].values.size() > 1);
     poisson = poisson || (axes[i].name == "poisson" && axes[i].values.size() > 1);
   }
-  constexpr double kMostCandidates = 1e6;
+  constexpr double kMostCandidates = 1e6;  // Candidates of a search. Work: a refusal.
   if (count_candidates(axes) > kMostCandidates) {
     std::string names;
     for (const Axis& axis : axes)

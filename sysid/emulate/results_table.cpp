@@ -89,7 +89,7 @@ double Row::not_negative(const std::string& name) const {
 }
 
 double Row::score(const std::string& name) const {
-  constexpr double kFarthest = 1e3;
+  constexpr double kFarthest = 1e3;  // Of a score that can be meant [m]. Work: a refusal.
   const double value = not_negative(name);
   if (value > kFarthest && std::isfinite(value)) throw error(name, "0 to 1000 m");
   return value;

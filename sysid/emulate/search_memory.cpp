@@ -12,11 +12,14 @@ namespace flash::sysid {
 
 namespace {
 
-constexpr double kLikelihood = 1e6;  // bytes a keyframe: fields of the likelihoods at hand
-constexpr double kAtEstimate = 14;   // motions about the estimate that are kept, of the search's own mesh
-constexpr double kOfErrors =
-    48;  // and of the answer's mesh: what errors are of, and how each moves the sheet
-// Vertices of the mesh of half the cell, over those of the search's; what a solver of it takes, over that.
+/// A keyframe: fields of the likelihoods at hand [bytes]. Work: for the memory that is told.
+constexpr double kLikelihood = 1e6;
+/// Motions about the estimate that are kept, of the search's own mesh. Work: likewise.
+constexpr double kAtEstimate = 14;
+/// And of the answer's mesh: what errors are of, and how each moves the sheet. Work: likewise.
+constexpr double kOfErrors = 48;
+/// Vertices of the mesh of half the cell, over those of the search's; what a solver of it takes, over that.
+/// Work: likewise.
 constexpr double kFiner = 4, kFinerSolid = 8, kFinerSolver = 4, kFinerSolidSolver = 16;
 
 double kept_steps(const Replay& replay) {

@@ -24,7 +24,8 @@ Eigen::Vector2d sides_of(const Replay& replay) {
 
 /// Of a patch at a corner against the one that was stated; empty where they agree.
 std::string corner_warning(const Replay& replay, const data::RecordedGrasp& grasp) {
-  constexpr double kSame = 0.1;  // of the patch
+  // Of the patch: cells that hold another size are warned of. Chosen: not varied.
+  constexpr double kSame = 0.1;
   const double within = size_of_patch(grasp, replay.settings),
                stated = sides_of(replay).cwiseMin(within).norm(), held = held_extent(replay, grasp);
   if (std::abs(held - stated) <= kSame * stated) return "";
@@ -45,7 +46,8 @@ ReplayCandidate extreme_candidate(const GridSettings& settings, bool limpest) {
   return candidate_at(values, settings);
 }
 
-constexpr double most_on_halves = 2 * most_of_fold;  // of the fold, where half the cells are coarse too
+/// Of the fold, where half the cells are coarse too. Work: follows from most_of_fold.
+constexpr double most_on_halves = 2 * most_of_fold;
 
 /// Whether cells that are coarse for the fold are halved for what comes.
 bool are_halved(const Replay& replay, Coming coming) {
@@ -76,7 +78,8 @@ std::string coarse_text(const Replay& replay, const ReplayCandidate& limpest, Co
 ReplayCandidate limpest_candidate(const GridSettings& settings) { return extreme_candidate(settings, true); }
 
 std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) {
-  constexpr double kSame = 0.01;  // of the smaller extent of the sheet
+  // Of the smaller extent of the sheet: halves that hold another size are warned of. Chosen: not varied.
+  constexpr double kSame = 0.01;
   std::vector<std::string> warnings;
   for (const Replay& replay : replays) {
     if (replay.recording.is_solid()) continue;

@@ -10,8 +10,10 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kLogStep = 0.1;    // 10 % of a parameter on a logarithmic axis
-constexpr double kRangeStep = 0.1;  // share of the searched range of another
+/// Of the logarithm of a parameter, to both sides. Chosen: 10 % of the parameter; not varied.
+constexpr double kLogStep = 0.1;
+/// Share of the searched range of a parameter that is not logarithmic, to both sides. Chosen: not varied.
+constexpr double kRangeStep = 0.1;
 
 double coordinate(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
 
@@ -130,7 +132,8 @@ Eigen::VectorXd displacements(const Sensitivity& sensitivity, const std::vector<
 
 Eigen::VectorXd explain(const Sensitivity& sensitivity, const Eigen::VectorXd& displacement,
                         const Eigen::VectorXd& ranges) {
-  constexpr double kFloor = 1e-6;  // [m]
+  // Of a displacement that parameters explain [m]. Work: keeps the problem regular.
+  constexpr double kFloor = 1e-6;
   const Eigen::Index parameters = ranges.size(), all = parameters + sensitivity.nuisance.cols();
   Eigen::MatrixXd matrix(displacement.size(), all);
   matrix << sensitivity.parameters * ranges.asDiagonal(), sensitivity.nuisance;

@@ -69,8 +69,8 @@ double TensorSpline::derivatives(const Eigen::VectorXd& x, Eigen::VectorXd& grad
 }
 
 double TensorSpline::minimize(Eigen::VectorXd& x) const {
-  constexpr int kIterations = 60;
-  constexpr double kEnough = 1e-9;  // gain that is not worth another step
+  constexpr int kIterations = 60;   // Work: a cap.
+  constexpr double kEnough = 1e-9;  // Of a deviance: a gain that is not worth another step. Work.
   Eigen::VectorXd gradient, next_gradient;
   Eigen::MatrixXd hessian, next_hessian;
   double here = derivatives(x, gradient, hessian), damping = 0;

@@ -8,6 +8,7 @@
 #include "data/files/error.h"
 #include "data/machine/parallel.h"
 #include "sysid/emulate/motion_slice.h"
+#include "sysid/infer/agreed_numbers.h"
 
 namespace flash::sysid {
 namespace {
@@ -20,16 +21,17 @@ std::array<double, 2> range_of(const Axis& axis) {
 int points_per_axis(const std::vector<Axis>& axes, Points points) {
   const auto searched =
       std::count_if(axes.begin(), axes.end(), [](const Axis& axis) { return axis.values.size() > 1; });
+  // Points an axis of a look, by how many parameters are searched, four or more alike. Chosen: some hundreds
+  // of likelihoods, or some dozens, a look. What hundreds miss on ridges is measured by `make ridge-study`.
   constexpr std::array<int, 5> kHundreds = {1, 17, 9, 7, 5}, kDozens = {1, 9, 7, 4, 3};
   return (points == Points::hundreds
               ? kHundreds
               : kDozens)[static_cast<std::size_t>(std::min<std::ptrdiff_t>(searched, 4))];
 }
 
-constexpr double kSame = 1e-9;   // of a width
-constexpr int kRounds = 12;      // of a look
-constexpr int kFewRounds = 4;    // where some dozens of points do
-constexpr double kUnlikely = 9;  // deviance over the least: three standard deviations
+constexpr double kSame = 1e-9;  // Of a width. Work: rounding.
+constexpr int kRounds = 12;     // Of a look. Work: a cap where the extent does not settle.
+constexpr int kFewRounds = 4;   // Of a look by some dozens of points. Work: likewise.
 
 double distance(const Axis& axis, double from, double to) {
   return axis.logarithmic ? std::log(to / from) : to - from;
@@ -83,8 +85,11 @@ Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& a
 
 Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes,
                    Points points) {
-  constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most
-  constexpr double kSmallest = 1e-4;      // half extent over the range
+  // Of an extent over the interval: aimed at, and at most. Chosen: the posterior fills half of what is looked
+  // at; not varied.
+  constexpr double kRoom = 2, kMost = 3;
+  // Half an extent over the range. Work: what is told better than by this is not looked at closer.
+  constexpr double kSmallest = 1e-4;
   Extent next = extent;
   bool fits = true;
   for (std::size_t k = 0; k < axes.size(); ++k) {
@@ -96,7 +101,7 @@ Extent next_extent(const Extent& extent, const Posterior& posterior, const std::
     double reach = 0;  // the larger half of the interval
     for (const std::size_t side : {0, 1}) {
       const bool open =
-          posterior.ends(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(side)) < kUnlikely;
+          posterior.ends(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(side)) < three_deviations;
       const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
       // Past an open end by a quarter of the width or more; a longer way would lose what the last extents
       // told.
@@ -278,7 +283,7 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
 Eigen::VectorXd deviance_at(const Emulator& emulator, const std::vector<std::vector<double>>& points,
                             const MotionLikelihood& likelihood, const GridSettings& grid,
                             const TellWork& told) {
-  constexpr std::size_t kTogether = 8;  // points that a thread takes, in the same memory
+  constexpr std::size_t kTogether = 8;  // Points that a thread takes, in the same memory. Work.
   using Slices = std::vector<TwoMeshSlice>;
   Slices all(emulator.models.size());
   for (std::size_t r = 0; r < all.size(); ++r) all[r].take(emulator.models[r].model);
@@ -303,7 +308,8 @@ Eigen::VectorXd deviance_at(const Emulator& emulator, const std::vector<std::vec
 
 std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<double>& values,
                                    const Extent& extent, const std::vector<Axis>& axes) {
-  constexpr double kStep = 0.1;  // of the extent, to both sides
+  // Of the extent, to both sides, for the rates of motions. Chosen: not varied.
+  constexpr double kStep = 0.1;
   std::vector<Replay> replays;
   for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
   std::vector<std::vector<double>> points;  // to both sides along each axis
@@ -370,7 +376,7 @@ int most_scores(const std::vector<Axis>& axes, Points points) {
 
 std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,
                           std::size_t at_most) {
-  constexpr int kMost = 9;  // of a wide axis
+  constexpr int kMost = 9;  // Values of a wide axis. Chosen: not varied.
   std::vector<Axis> axes = searched;
   std::size_t narrow = 1, wide = 0;
   const auto is_wide = [&](std::size_t k) {
@@ -420,6 +426,7 @@ bool reaches_beyond(const Extent& extent, const std::vector<Axis>& axes) {
 }
 
 Extent next_lattice(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& searched) {
+  // Of a lattice: a posterior that takes less of it has another. Chosen: half, as a look has it; not varied.
   constexpr double kPart = 0.5 - kSame;
   const Extent looked = extent_of(posterior.axes);
   Extent next = next_extent(looked, posterior, searched);
@@ -430,7 +437,7 @@ Extent next_lattice(const Extent& extent, const Posterior& posterior, const std:
     const auto [low, high] = extent[k];
     const double width = distance(axis, low, high), first = axis.values.front(), last = axis.values.back();
     const auto leaves = [&](bool upper, double looked_to, double side, double range) {
-      return posterior.ends(static_cast<Eigen::Index>(k), upper ? 1 : 0) < kUnlikely &&
+      return posterior.ends(static_cast<Eigen::Index>(k), upper ? 1 : 0) < three_deviations &&
              std::abs(distance(axis, looked_to, side)) <= kSame * width &&
              std::abs(distance(axis, side, range)) > kSame * width;
     };

@@ -6,6 +6,7 @@
 #include "data/files/text.h"
 #include "sysid/emulate/focused_axes.h"
 #include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/agreed_numbers.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/importance_sampling.h"
@@ -23,8 +24,9 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kFarther = 1.3;  // of a distance over that of the best candidate
-constexpr double kAbrupt = 1e-3;  // by which motions that can be predicted do not part [m]
+/// By which motions that can be predicted do not part [m]. Measured: of 42 searches of a strip that stands on
+/// its clamp, 21 missed by 6 to 24 mm. It tells 20 of these. Smooth ones are as they were.
+constexpr double kAbrupt = 1e-3;
 
 std::string millimetres(double distance) { return data::format_short(1e3 * distance) + " mm"; }
 
@@ -261,7 +263,6 @@ std::vector<LeftResiduals> left_by(const Task& task, const Found& found,
 std::optional<Found> look_on_cells_for_fold(const Task& task, const Found& rough,
                                             std::vector<Replay>& replays, std::vector<Replay>& finer,
                                             std::vector<KnownError>& held, Answer& answer) {
-  constexpr double kSure = 9;  // of a deviance: three standard deviations
   const std::vector<double> values = rough.look.posterior.values();
   std::vector<Replay> smaller = on_cells_for_fold(replays, candidate_at(values, task.grid));
   if (smaller.empty()) return std::nullopt;
@@ -271,7 +272,7 @@ std::optional<Found> look_on_cells_for_fold(const Task& task, const Found& rough
   std::optional<Found> found =
       look_about(there, extent_of(rough.look.posterior.axes), values, true, {}, held_there);
   if (!found || excess_deviance(left_by(task, rough, held), left_by(there, *found, held_there),
-                                task.settings.repeatability) > kSure)
+                                task.settings.repeatability) > three_deviations)
     return std::nullopt;
   answer.warnings.push_back(cells_for_fold_text(replays, smaller));
   replays = std::move(smaller);
@@ -335,7 +336,7 @@ Answer answer_by_best(const GridResults& results, const std::vector<Replay>& rep
 
 /// Doubts of an estimate beside the candidate that came nearest.
 void warn_of_estimate(const Task& task, const Found& found, const CandidateResult& nearest, Answer& answer) {
-  if (answer.estimate.score > kFarther * nearest.score)
+  if (answer.estimate.score > much_farther * nearest.score)
     answer.warnings.push_back("the best candidate misses the cloth by " + millimetres(nearest.score) +
                               ", the estimate by " + millimetres(answer.estimate.score) +
                               ": errors of the cells, of the step and of what is held decide between them; "

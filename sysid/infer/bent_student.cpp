@@ -27,7 +27,8 @@ class Moments {
 
   /// See fitted_student.
   Parabola along(const Eigen::VectorXd& direction) const {
-    constexpr double kLeast = 1e-6;  // of s, which is 2 for a Gaussian and 0 for two values of t
+    // Of s, which is 2 for a Gaussian and 0 for two values of t. Work: rounding.
+    constexpr double kLeast = 1e-6;
     const Eigen::VectorXd v = direction.normalized();
     const Eigen::VectorXd square = (v * v.transpose()).reshaped();
     const Eigen::VectorXd g = third_ * square;
@@ -59,7 +60,8 @@ Eigen::MatrixXd directions_of(const Eigen::MatrixXd& root) {
 
 /// The parabola that explains most, by pattern search from the best of the rows of `starts`.
 Parabola best_parabola(const Moments& moments, const Eigen::MatrixXd& starts) {
-  constexpr double kFirst = 0.4, kLast = 0.01;  // steps of a unit vector
+  // Steps of a unit vector, the first and the last. Work: a search among proposals.
+  constexpr double kFirst = 0.4, kLast = 0.01;
   Parabola best = moments.along(starts.row(0).transpose());
   const auto improves = [&](const Eigen::VectorXd& direction) {
     Parabola other = moments.along(direction);
@@ -126,9 +128,13 @@ Eigen::VectorXd BentStudent::draw(RandomNumbers& random) const {
 
 BentStudent fitted_student(const Eigen::MatrixXd& points, const Eigen::VectorXd& weights,
                            const Eigen::MatrixXd& prior) {
-  // Covariances are as well known as by twice as many points as there are coordinates, at first.
-  constexpr double kPrior = 2, kRounding = 1e-12;
-  // By chance t^2 explains about d - 1 over the count, more where the best direction is looked for.
+  // Times the coordinates: points that the prior of a covariance weighs. Work: a proposal, whose draws are
+  // weighted.
+  constexpr double kPrior = 2;
+  constexpr double kRounding = 1e-12;  // Of the prior. Work: rounding.
+  // By chance t^2 explains about d - 1 over the count, more where the best direction is looked for. What of
+  // it may be chance, over d, and points by which a bend is shrunk. Work: a proposal, whose draws are
+  // weighted.
   constexpr double kChance = 5, kStraight = 10;
   const Eigen::Index d = points.cols();
   const double count = 1 / weights.squaredNorm();  // that the points are worth

@@ -9,7 +9,7 @@ namespace flash::sysid {
 /// and scale root root^T. Since along . bend = 0, the map from r to x has Jacobian 1. Of bend 0 it is
 /// straight.
 struct BentStudent {
-  static constexpr int kFreedom = 5;  ///< degrees of freedom
+  static constexpr int kFreedom = 5;  ///< Degrees of freedom. Work: tails that bound the weights of draws.
   Eigen::VectorXd mean, along, bend;
   Eigen::MatrixXd root;  ///< lower triangular
 

@@ -11,24 +11,37 @@
 
 #include "data/machine/parallel.h"
 #include "data/numbers/chi_square.h"
+#include "sysid/infer/agreed_numbers.h"
 #include "sysid/infer/discrepancy_prior.h"
 #include "sysid/infer/local_noise.h"
 
 namespace flash::sysid {
 namespace {
 
-constexpr double kTimes[] = {0.125, 0.25, 0.5, 1};   // reaches over the duration
-constexpr double kSheets[] = {0.125, 0.25, 0.5, 1};  // over the longest side of the sheet
-constexpr Eigen::Index kCoordinates = 160;           // of a field, at most
-constexpr double kLeast = 1e-5;                      // variance of a coordinate over the largest
-constexpr int kSizes = 20;                           // values of tau, to that of the residuals
-constexpr double kFirstSize = 0.03;                  // over sigma
-constexpr double kLeastFreedom = 0.1;                // of the rows
-constexpr int kFew = 12;        // rows of one keyframe and channel that are too few to tell noise from misfit
-constexpr double kVague = 100;  // of what is not known, over the residuals
-// Chi-square with 3 degrees of freedom: a size and two reaches.
+/// Reaches over the duration, all alike likely. Chosen: not varied.
+constexpr double kTimes[] = {shortest_reach, 0.25, 0.5, 1};
+/// Reaches over the longest side of the sheet, all alike likely. Chosen: not varied.
+constexpr double kSheets[] = {shortest_reach, 0.25, 0.5, 1};
+/// Of a field, at most. Work: with the next one, the likelihood is that of the dense covariance to 1e-3
+/// (tests).
+constexpr Eigen::Index kCoordinates = 160;
+/// Variance of a coordinate over the largest. Work: smaller ones are left out.
+constexpr double kLeast = 1e-5;
+constexpr int kSizes = 20;  // Values of tau, to that of the residuals. Work: points of a quadrature.
+/// Over sigma: the least tau above none. Work: where the quadrature begins; less is none beside the noise.
+constexpr double kFirstSize = 0.03;
+/// Of the rows, over which the noise is estimated at least. Chosen: keeps few rows from a noise without end;
+/// not varied.
+constexpr double kLeastFreedom = 0.1;
+/// Rows of one keyframe and channel that are too few to tell noise from misfit. Chosen: for the markers of a
+/// silicone beam, where both came out as none; not varied.
+constexpr int kFew = 12;
+/// Of what has no prior, over the residuals. Theory: stands for infinity in a restricted likelihood.
+constexpr double kVague = 100;
+/// Fall of -2 log likelihood from which a discrepancy is found. Theory: chi-square with 3 degrees of freedom,
+/// a size and two reaches, once in twenty.
 constexpr double kOnceInTwenty = data::chi_square_95_of_3;
-constexpr std::size_t kDraws = 32;  // of size and reaches
+constexpr std::size_t kDraws = 32;  // Of size and reaches. Work: draws for predictions.
 
 /// Row of (keyframe, channel) blocks, `modes` long each.
 Eigen::Index block(int keyframe, int channel, int channels, int modes) {
@@ -46,7 +59,7 @@ int most_rows_together(const ObservedRows& rows) {
 
 /// Of the matrix that was factored: the sum of squares of L^-1, whose columns are zero above the diagonal.
 double trace_of_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor) {
-  constexpr Eigen::Index kColumns = 32;  // at a time
+  constexpr Eigen::Index kColumns = 32;  // At a time. Work.
   const Eigen::MatrixXd& packed = factor.matrixLLT();
   double sum = 0;
   for (Eigen::Index left = packed.rows(); left > 0; left -= kColumns) {

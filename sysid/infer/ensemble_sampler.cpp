@@ -7,7 +7,7 @@ namespace flash::sysid {
 
 Eigen::MatrixXd sample_ensemble(const std::function<double(const Eigen::VectorXd&)>& log_density,
                                 const Eigen::MatrixXd& start, const EnsembleSettings& settings) {
-  constexpr double kStretch = 2;
+  constexpr double kStretch = 2;  // Of the stretch moves. Work: a of Goodman and Weare 2010.
   const Eigen::Index walkers = start.rows(), half = walkers / 2;
   std::mt19937_64 random(settings.seed);
   // The distributions of the standard library differ between libraries.

@@ -13,10 +13,13 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kUnsure =
-    2;  // over the last step to cells of no size: an error of first order ends at a share of 2
+/// Over the last step to cells of no size: how unsure it is. Theory: an error of first order ends at a share
+/// of 2, one of second order at 4/3.
+constexpr double kUnsure = 2;
 
-constexpr double kFarBetter = 0.25;  // of the standard deviation assumed of what is held
+/// Of the standard deviation assumed of what is held: what the recordings tell better than so is named.
+/// Chosen: not varied.
+constexpr double kFarBetter = 0.25;
 
 bool all_finite(const std::vector<ReplayResult>& results) {
   return std::all_of(results.begin(), results.end(),
@@ -116,7 +119,9 @@ struct HeldMotions {
 /// At one side of what is held; nearer where they diverge.
 HeldMotions motions_towards(const Task& task, const std::vector<double>& values, const HeldParameter& held,
                             std::size_t side) {
-  constexpr double kNearest = 1.0 / 8;  // of the deviation
+  // Of the deviation of what is held: a motion nearer than that, where others diverge, says too little.
+  // Chosen: not varied.
+  constexpr double kNearest = 1.0 / 8;
   for (double share = 1; share >= kNearest; share /= 2) {
     if (share < 1 && task.told) task.told({}, {-static_cast<int>(task.replays.size()), 0});
     const ReplayCandidate candidate = candidate_with(values, task.grid, held.name, held.nearer(side, share));
@@ -192,8 +197,12 @@ void warn_of_held(const Task& task, const std::vector<double>& values, const Mot
 std::vector<std::string> contradicted_stiffnesses(const Task& task, const std::vector<double>& values,
                                                   const MotionLikelihood& likelihood,
                                                   const std::vector<KnownError>& errors) {
-  constexpr double kAnother = 0.25;  // of the standard deviation assumed
-  constexpr double kSure = 2;        // standard deviations of what the recordings tell
+  // Of the standard deviation assumed: a held stiffness that is asked to be farther away is contradicted.
+  // Chosen: not varied.
+  constexpr double kAnother = 0.25;
+  // Standard deviations of what the recordings tell, from which a held stiffness is contradicted. Theory:
+  // once in twenty.
+  constexpr double kSure = 2;
   std::vector<std::string> texts;
   for (const HeldParameter& held : held_parameters(task.grid, task.replays, values)) {
     if (!is_stiffness(held.name) || task.grid.deviations.contains(held.name)) continue;

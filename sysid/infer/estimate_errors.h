@@ -10,13 +10,13 @@
 
 namespace flash::sysid {
 
-// Shares of a TwoMeshMotions: the search's own mesh, the finer one, and cells of no size.
+// Shares of a TwoMeshMotions: own mesh, finer one, no cells. Theory: of second order (Richardson 1911).
 inline constexpr double own_mesh = 0, finer_mesh = 1, no_cells = 4.0 / 3;
 
-/// Draws at which an emulator is tried.
+/// Draws at which an emulator is tried. Chosen: a motion each, so few; not varied.
 inline constexpr int emulator_draws = 4;
 
-/// Motions simulated at an estimate, a recording: itself, three finer ones, and the draws.
+/// Motions simulated at an estimate, a recording: itself, three finer ones, and the draws. Work.
 inline constexpr int motions_at_estimate = 4 + emulator_draws;
 
 /// What all steps of an answer need.

@@ -5,15 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sysid/infer/agreed_numbers.h"
 #include "sysid/infer/sheet_modes.h"
 
 namespace flash::sysid {
 namespace {
 
-constexpr double kUntold = 1e-8;  // information of a direction over that of the best
-constexpr double kEven = 3;       // precision of what is even between -1 and 1
-constexpr int kRounds = 30;
-constexpr double kSame = 1e-3;
+/// Precision of what is even between -1 and 1. Theory: the variance is a third.
+constexpr double kEven = 3;
+constexpr int kRounds = 30;     // Of the spread. Work: a cap.
+constexpr double kSame = 1e-3;  // Of the spread. Work: where rounds end.
 
 /// Columns that make the information 1; directions of none are left out.
 Eigen::MatrixXd inverse_root(const Eigen::MatrixXd& information) {
@@ -21,7 +22,7 @@ Eigen::MatrixXd inverse_root(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd& values = eigen.eigenvalues();
   std::vector<Eigen::Index> told;
   for (Eigen::Index i = 0; i < values.size(); ++i)
-    if (values[i] > 0 && values[i] > kUntold * values[values.size() - 1]) told.push_back(i);
+    if (values[i] > 0 && values[i] > least_information * values[values.size() - 1]) told.push_back(i);
   return eigen.eigenvectors()(Eigen::all, told) * values(told).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 

@@ -14,10 +14,14 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kScore = 1.0 / 40;  // of a candidate, as motions of a towel are scored
-constexpr double kLookShare = 0.2;   // of the points that two looks may take
-constexpr double kFollow = 0.6;      // of looks after which the cells of the sheet are halved anew
-constexpr double kSheetHalved = 4;   // vertices, of half the cells, and of the grasps alone
+/// Of a candidate: a likelihood. Work: as motions of a towel are scored; for the time left alone.
+constexpr double kScore = 1.0 / 40;
+/// Of the points that two looks may take. Work: for the time left alone.
+constexpr double kLookShare = 0.2;
+/// Of looks after which the cells of the sheet are halved anew. Work: for the time left alone.
+constexpr double kFollow = 0.6;
+constexpr double kSheetHalved = 4;  // Vertices, of half the cells. Work: for the time left alone.
+/// Vertices, of half the cells at grasps alone. Work: for the time left alone.
 constexpr double kGraspsHalved = 1.3;
 
 double vertices_of(const std::vector<Replay>& replays) {

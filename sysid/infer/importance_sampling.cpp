@@ -34,6 +34,7 @@ struct Mixture {
 
   /// Draws until `count` are in the unit box, a row each. Fewer where hardly any is.
   Eigen::MatrixXd draw(Index count, RandomNumbers& random) {
+    // Draws a point in the box. Work: a cap where hardly any is inside.
     constexpr double kMostPerPoint = 10'000;
     Eigen::MatrixXd inside(count, components.front().mean.size());
     Index found = 0;
@@ -107,11 +108,12 @@ class Sample {
 /// One component for all points, which has half, and some for neighbourhoods of points drawn by weight.
 Mixture fitted_mixture(const Eigen::MatrixXd& all, const Eigen::VectorXd& all_weights,
                        RandomNumbers& random) {
-  constexpr double kNothing = 1e-9;  // weight of a point that tells nothing
-  constexpr double kWhole = 0.5;     // share of the component for all
-  constexpr Index kLocal = 8;
-  constexpr double kNear = 0.7;   // size of a neighbourhood, in standard deviations
-  constexpr double kWider = 1.1;  // than fitted: weights are bounded by tails
+  constexpr double kNothing = 1e-9;  // Weight of a point that tells nothing. Work.
+  // Share of the component for all. Work: a proposal, whose draws are weighted.
+  constexpr double kWhole = 0.5;
+  constexpr Index kLocal = 8;     // Components for neighbourhoods. Work: likewise.
+  constexpr double kNear = 0.7;   // Size of a neighbourhood, in standard deviations. Work: likewise.
+  constexpr double kWider = 1.1;  // Than fitted: weights are bounded by tails. Work: likewise.
   std::vector<Index> telling;
   for (Index i = 0; i < all_weights.size(); ++i)
     if (all_weights[i] > kNothing) telling.push_back(i);
@@ -212,8 +214,9 @@ Eigen::MatrixXd WeightedDraws::resampled(Eigen::Index count, unsigned seed) cons
 
 WeightedDraws sample_by_importance(const LogDensities& log_densities, const Eigen::VectorXd& low,
                                    const Eigen::VectorXd& high, const ImportanceSettings& settings) {
-  constexpr double kPower = 0.5;        // of every second proposal
-  constexpr double kPerDimension = 10;  // effective size that a fit needs
+  constexpr double kPower = 0.5;  // Of every second proposal. Work: finds the ends of ridges.
+  // Effective size that a fit needs. Work: a proposal, whose draws are weighted.
+  constexpr double kPerDimension = 10;
   const Asked asked(log_densities, low, high);
   const Index dimensions = low.size();
   Sample sample = first_sample(asked, dimensions, settings);

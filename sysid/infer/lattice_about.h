@@ -11,7 +11,7 @@
 
 namespace flash::sysid {
 
-inline constexpr int lattice_rounds = 8;  // of motions about an answer
+inline constexpr int lattice_rounds = 8;  // Of motions about an answer. Work: a cap where they do not settle.
 
 /// Motions of a lattice over what is searched: three values of each of up to four parameters. Of five and
 /// more nothing is simulated about the answer.

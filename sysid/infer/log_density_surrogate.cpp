@@ -32,6 +32,7 @@ Eigen::MatrixXd squared_distances(const Eigen::MatrixXd& a, const Eigen::MatrixX
 /// The likeliest points, and the last ones, which say where a surrogate was wrong. Time grows by the cube of
 /// their number.
 AskedPoints likeliest(const AskedPoints& all) {
+  // Points that a surrogate is fitted to, at least, and a coefficient. Work: time grows by their cube.
   constexpr Eigen::Index kMost = 150, kPerCoefficient = 10;
   const Eigen::Index count =
       std::min(all.size(), std::max(kMost, kPerCoefficient * quadratic_coefficients(all.points.cols())));
@@ -59,7 +60,8 @@ void AskedPoints::add(const Eigen::MatrixXd& more, const Eigen::VectorXd& logs) 
 }
 
 LogDensitySurrogate::Fitted LogDensitySurrogate::fitted(const Kernel& kernel) const {
-  constexpr double kWide = 1e-10;  // precision of a coefficient before
+  // Precision of a coefficient before, over what the points tell. Work: rounding.
+  constexpr double kWide = 1e-10;
   Eigen::MatrixXd covariance =
       kernel.size * kernel.size * (-squares_.array() / (2 * kernel.reach * kernel.reach)).exp().matrix();
   covariance.diagonal().array() += kernel.noise * kernel.noise + far_.array();
@@ -82,8 +84,10 @@ LogDensitySurrogate::Fitted LogDensitySurrogate::fitted(const Kernel& kernel) co
 
 LogDensitySurrogate::LogDensitySurrogate(const AskedPoints& all, BentStudent coordinates)
     : coordinates_(std::move(coordinates)) {
-  constexpr double kRough = 0.15;  // of what a log density falls: how well it need be known
-  constexpr int kNear = 3;         // points a coefficient that are known in any case
+  // Of what a log density falls beyond what is told: how well it need be known. Work: a surrogate, whose
+  // draws are tried.
+  constexpr double kRough = 0.15;
+  constexpr int kNear = 3;  // Points a coefficient that are known in any case. Work: likewise.
   const AskedPoints asked = likeliest(all);
   white_ = coordinates_.white(asked.points);
   squares_ = squared_distances(white_, white_);
@@ -98,9 +102,9 @@ LogDensitySurrogate::LogDensitySurrogate(const AskedPoints& all, BentStudent coo
   const Eigen::Index near = std::min(kNear * basis_.cols(), falls.size() - 1);
   std::nth_element(falls.data(), falls.data() + near, falls.data() + falls.size());
   far_ = (kRough * (-values_.array() - std::max(kTold, falls[near])).max(0)).square();
-  // By pattern search over the logarithms.
+  // Of size, reach and noise of the kernel, by pattern search over the logarithms. Work: likewise.
   constexpr std::array<std::array<double, 2>, 3> kBounds = {{{1e-2, 1e4}, {0.3, 30}, {1e-3, 3}}};
-  constexpr double kLast = 1.3;
+  constexpr double kLast = 1.3;  // Factor with which the search of these ends. Work: likewise.
   std::array<double, 3> at = {3, 3, 0.03};
   const auto of = [](const std::array<double, 3>& x) { return Kernel{x[0], x[1], x[2]}; };
   kernel_ = of(at);
@@ -124,7 +128,8 @@ LogDensitySurrogate::LogDensitySurrogate(const AskedPoints& all, BentStudent coo
 }
 
 Eigen::VectorXd LogDensitySurrogate::operator()(const Eigen::MatrixXd& points) const {
-  constexpr double kSupport = 10;  // of white coordinates: a polynomial may rise again far from its points
+  // Of white coordinates: a polynomial may rise again far from its points. Work: likewise.
+  constexpr double kSupport = 10;
   const Eigen::MatrixXd white = coordinates_.white(points);
   const Eigen::ArrayXXd exponents =
       squared_distances(white, white_).array() / (-2 * kernel_.reach * kernel_.reach);

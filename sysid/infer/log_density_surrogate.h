@@ -23,11 +23,11 @@ struct AskedPoints {
 /// s, l and the noise are those of the largest marginal likelihood. White coordinates are those of a
 /// BentStudent, so that a ridge along a parabola is a Gaussian. A log density far below the largest need be
 /// known by its size alone: beyond `kTold`, or beyond as many points as a polynomial needs, its deviation is
-/// a half of what it falls. Of many points the likeliest and the last count. It falls beyond ten standard
-/// deviations.
+/// 0.15 of what it falls beyond that. Of many points the likeliest and the last count. It falls beyond ten
+/// standard deviations.
 class LogDensitySurrogate {
  public:
-  static constexpr double kTold = 12;  ///< of a log density below the largest: that of Gaussians at 4.9 sd
+  static constexpr double kTold = 12;  ///< Below the largest: 4.9 sd of Gaussians. Work: draws are tried.
 
   /// At least as many points as a quadratic polynomial has coefficients, some of a density above 0.
   LogDensitySurrogate(const AskedPoints& all, BentStudent coordinates);

@@ -8,7 +8,7 @@
 namespace flash::sysid {
 
 double MarkerFit::most_noise() const {
-  constexpr double kOnceInTwenty = 1.644854;  // of a standard normal
+  constexpr double kOnceInTwenty = 1.644854;  // Of a standard normal. Theory: once in twenty, one-sided.
   const double freedom = 3.0 * std::max(sightings, 1), spread = 2 / (9 * freedom);
   // Wilson and Hilferty 1931.
   return noise * std::sqrt(3 * std::pow(1 - spread + kOnceInTwenty * std::sqrt(spread), 3));

@@ -12,7 +12,8 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                                    const std::vector<ReplayResult>& reference, const ScoreSettings& settings,
                                    std::optional<double> repeatability, const std::vector<KnownError>& errors,
                                    const std::vector<MotionChange>& rates, std::size_t first) {
-  constexpr int kPasses = 2;  // where the nuisance is linear: without known errors, then at those found
+  // Where the nuisance is linear: without known errors, then at those found. Chosen: not varied.
+  constexpr int kPasses = 2;
   const std::vector<Registration> registrations = registrations_of(replays, reference, settings);
   const Robust& robust = settings.objective.robust;
   recordings_.resize(replays.size());
@@ -156,9 +157,10 @@ void MotionLikelihood::set_shifts(const Recording& recording, const Nuisance& nu
 std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     const Recording& recording, const Nuisance& start,
     const std::function<const Motion&(double time_offset)>& motion_at, int threads) {
+  // Of a fit. Work: a cap; six, whether they fell or not, cut profiles of D off.
   constexpr int kSteps = 30;
-  // Of s: what a last step may move all rows by, a quarter of a unit of deviance. With steps that moved them
-  // by seven the intervals of equal searches by two routes differed by 12 %, now by 6 %.
+  // Of s: what a last step may move all rows by, a quarter of a unit of deviance. Measured: with steps that
+  // moved them by seven the intervals of equal searches by two routes differed by 12 %, now by 6 %.
   constexpr double kSame = 0.5;
   const auto is_same = [&](const Nuisance& a, const Nuisance& b) {
     const Eigen::VectorXd moved = recording.registered * (b.registration - a.registration) +

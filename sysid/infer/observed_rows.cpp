@@ -12,7 +12,8 @@ using Term = LinearObservations::Term;
 
 /// Distances beyond this count by less than their square: none without robustness.
 double limit_of(std::vector<double> distances, const Robust& robust) {
-  constexpr double kSpread = 1.4826;  // standard deviation over the median of normal distances
+  // Standard deviation over the median of normal distances. Theory: 1 over the normal quantile of 75 %.
+  constexpr double kSpread = 1.4826;
   if (robust.kind != RobustKind::trimmed) return INFINITY;
   const auto at = [&](double share) {
     const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(distances.size() - 1));

@@ -9,13 +9,16 @@
 #include <utility>
 
 #include "sysid/emulate/tensor_spline.h"
+#include "sysid/infer/agreed_numbers.h"
 #include "sysid/infer/ensemble_sampler.h"
 
 namespace flash::sysid {
 namespace {
 
-constexpr Eigen::Index kWalkers = 64;
-constexpr double kFarthest = 200;  // deviance over the least beyond which a spline need not follow
+constexpr Eigen::Index kWalkers = 64;  // Of the ensemble. Work.
+/// Deviance over the least beyond which a spline need not follow. Work: the density there is 4e-44 of the
+/// largest.
+constexpr double kFarthest = 200;
 
 std::vector<Eigen::VectorXd> knots_of(const std::vector<Axis>& axes) {
   std::vector<Eigen::VectorXd> knots;
@@ -173,7 +176,6 @@ Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd
 }
 
 Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance, unsigned seed) {
-  constexpr Eigen::Index kDraws = 12'800;
   const TensorSpline points = spline_of(axes, deviance);
   Eigen::Index likeliest;
   const double least = points.values().minCoeff(&likeliest);
@@ -190,8 +192,8 @@ Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd
   }
   std::mt19937_64 random(seed);
   const auto uniform = [&] { return static_cast<double>(random() >> 11U) * 0x1p-53; };
-  posterior.samples.resize(kDraws, points.dimensions());
-  for (Eigen::Index draw = 0; draw < kDraws; ++draw) {
+  posterior.samples.resize(posterior_draws, points.dimensions());
+  for (Eigen::Index draw = 0; draw < posterior_draws; ++draw) {
     const auto drawn = std::upper_bound(sums.begin(), sums.end() - 1, uniform() * sums.back());
     const Eigen::VectorXd node = node_of(points, drawn - sums.begin());
     for (Eigen::Index k = 0; k < points.dimensions(); ++k) {

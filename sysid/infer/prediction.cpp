@@ -6,6 +6,7 @@
 #include <random>
 
 #include "data/files/error.h"
+#include "sysid/infer/agreed_numbers.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/local_noise.h"
 #include "sysid/infer/motion_likelihood.h"
@@ -15,9 +16,8 @@
 namespace flash::sysid {
 namespace {
 
-constexpr int kRecordings = 4000;    // expected ones: a half of them tells chances of a thousandth
-constexpr double kLeast = 1e-9;      // of a distance of which the logarithm is taken [m]
-constexpr double kShortest = 0.125;  // reach of DiscrepancyModel over the sheet
+constexpr int kRecordings = 4000;  // Expected ones. Work: a half of them tells chances of a thousandth.
+constexpr double kLeast = 1e-9;    // Of a distance of which the logarithm is taken [m]. Work: rounding.
 
 /// Mean distance of each keyframe, over its channels.
 std::vector<double> distances_of(const ObservedRows& rows, const Eigen::VectorXd& residuals,
@@ -53,7 +53,7 @@ class ErrorDraws {
       : smooth_(field(modes, discrepancy.size, discrepancy.reach_sheet)),
         rough_(field(modes,
                      std::sqrt(std::max(0.0, misfit.rough * misfit.rough - misfit.noise * misfit.noise)),
-                     kShortest * modes.length)),
+                     shortest_reach * modes.length)),
         channels_(1 + *std::max_element(rows.channel.begin(), rows.channel.end())) {
     const auto count = static_cast<Eigen::Index>(rows.times.size());
     Eigen::MatrixXd in_time(count, count);
@@ -62,7 +62,8 @@ class ErrorDraws {
         in_time(k, l) = correlation_in_time(
             std::abs(rows.times[static_cast<std::size_t>(k)] - rows.times[static_cast<std::size_t>(l)]) /
             std::max(discrepancy.reach_time, 1e-9));
-    constexpr double kRounding = 1e-9;  // keyframes that agree leave the matrix singular
+    // Keyframes that agree leave the matrix singular. Work: rounding.
+    constexpr double kRounding = 1e-9;
     in_time.diagonal().array() += kRounding;
     in_time_ = in_time.llt().matrixL();
   }
@@ -100,12 +101,11 @@ class LinearFit {
  public:
   /// `spread`: s of the likelihood [m].
   LinearFit(const ObservedRows& rows, double spread) : columns_(rows.weights.size(), 0) {
-    constexpr double kFree = 1e-6;  // precision of what may be anything within its bounds
     columns_.resize(rows.weights.size(), rows.free.cols() + rows.known.cols());
     columns_ << rows.free, rows.known;
     weighed_ = (columns_.transpose() * rows.weights.asDiagonal()) / (spread * spread);
     Eigen::MatrixXd normal = weighed_ * columns_;
-    normal.diagonal().head(rows.free.cols()).array() += kFree;
+    normal.diagonal().head(rows.free.cols()).array() += free_precision;
     normal.diagonal().tail(rows.known.cols()).array() += 1;
     solver_.compute(normal);
   }
@@ -211,6 +211,7 @@ double chance_of(const Eigen::MatrixXd& expected, const Eigen::VectorXd& observe
 /// How the motion changes from the estimate to some draws: by these the likelihood decides how much a row
 /// counts, and so how much of a misfit errors of known shape may take.
 std::vector<MotionChange> rates_by_draws(const Replay& replay, const std::vector<ReplayResult>& motions) {
+  // Of the posterior, for the rates by which rows are weighed. Chosen: not varied.
   constexpr std::size_t kDraws = 4;
   const auto of = [&](const ReplayResult& motion) {
     return std::make_shared<const Motions>(Motions{{replay}, {motion}});
@@ -241,8 +242,8 @@ std::vector<KnownError> errors_of_prediction(const Replay& replay, const GridSet
   if (solved.no_cells) {
     const Replay half = on_half_the_cell(replay);
     const auto to = std::make_shared<const Motions>(Motions{{half}, {store.run(half, candidate)}});
-    // Four equal parts correct by all of the step to cells of no size, and leave half of it unsure: twice the
-    // last third, as in an answer.
+    // Equal parts of the step to cells of no size: they correct by all of it, and leave half of it unsure.
+    // Theory: twice the last third, as in an answer.
     constexpr int kParts = 4;
     for (int part = 0; part < kParts; ++part) add("double_mesh", no_cells / kParts, to);
   }

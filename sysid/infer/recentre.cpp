@@ -15,8 +15,13 @@ constexpr const char* kSize = "grasp_size";
 }  // namespace
 
 std::optional<double> told_grasp_size(const Task& task, const Found& found) {
-  constexpr double kFar = 0.1, kTold = 0.5;  // standard deviations of what was assumed
-  constexpr double kMost = 2;                // at a time
+  // Standard deviations of what was assumed of the size of a grasp: one that is told to be farther away has a
+  // lattice of its own. Chosen: not varied.
+  constexpr double kFar = 0.1;
+  // Standard deviations of what was assumed: what is told worse has none. Chosen: not varied.
+  constexpr double kTold = 0.5;
+  // Standard deviations of what was assumed, at a time. Work: farther is reached by the next round.
+  constexpr double kMost = 2;
   const auto error = std::find_if(found.errors.begin(), found.errors.end(),
                                   [](const KnownError& each) { return each.name == kSize; });
   if (error == found.errors.end()) return std::nullopt;
@@ -32,7 +37,7 @@ std::optional<double> told_grasp_size(const Task& task, const Found& found) {
 }
 
 Found about_told_grasp(const Task& task, Found found, GridSettings& grid, std::vector<KnownError>& held) {
-  constexpr int kRounds = 4;
+  constexpr int kRounds = 4;  // Lattices about a size that is told. Work: a cap.
   const bool finer = found.emulator.share != own_mesh;
   for (int round = 0; round < kRounds; ++round) {
     const std::optional<double> size = told_grasp_size(task, found);

@@ -19,7 +19,7 @@ Alone alone_by(const Task& task, const Emulator& own, const Extent& extent, cons
 
 /// Of what the recordings ask for, each by what it knows.
 std::vector<double> mean_of(const std::vector<Alone>& alone, const std::vector<Axis>& axes) {
-  constexpr double kLeast = 1e-9;  // of a spread
+  constexpr double kLeast = 1e-9;  // Of a spread. Work: rounding.
   std::vector<double> mean;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     double sum = 0, weights = 0;

@@ -8,14 +8,16 @@
 #include <vector>
 
 #include "data/numbers/median.h"
+#include "sysid/infer/agreed_numbers.h"
 
 namespace flash::sysid {
 namespace {
 
-constexpr double kEfficient = 1.345;  // 95 % of least squares under normal noise
-constexpr double kUntold = 1e-8;      // information of a direction over that of the best
-constexpr double kFree = 1e-6;        // precision of an error that may be anything within its bounds
-constexpr int kRounds = 30, kFits = 20;
+/// Over the noise: where Huber's function turns to a distance. Theory: 95 % of the efficiency of least
+/// squares under normal noise (Huber 1964).
+constexpr double kEfficient = 1.345;
+constexpr int kRounds = 30, kFits = 20;  // Of the spread, and of a fit. Work: caps.
+/// Of the spread, and of the deviance. Work: where rounds end.
 constexpr double kSame = 1e-3, kSameFit = 1e-6;
 
 /// Columns that make the information 1; directions of none are left out.
@@ -24,7 +26,7 @@ Eigen::MatrixXd inverse_root(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd& values = eigen.eigenvalues();
   std::vector<Eigen::Index> told;
   for (Eigen::Index i = 0; i < values.size(); ++i)
-    if (values[i] > kUntold * values[values.size() - 1]) told.push_back(i);
+    if (values[i] > least_information * values[values.size() - 1]) told.push_back(i);
   return eigen.eigenvectors()(Eigen::all, told) * values(told).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
@@ -114,7 +116,7 @@ Eigen::VectorXd ResidualLikelihood::error_variances() const {
   all << known_, rates_;
   Eigen::MatrixXd normal = all.transpose() * weights_.asDiagonal() * all / (spread_ * spread_);
   normal.diagonal().head(priors_.size()) += priors_;
-  normal.diagonal().tail(rates_.cols()).array() += kFree;
+  normal.diagonal().tail(rates_.cols()).array() += free_precision;
   return normal.llt().solve(Eigen::MatrixXd::Identity(all.cols(), all.cols())).diagonal().head(known_.cols());
 }
 
@@ -123,7 +125,7 @@ Eigen::VectorXd ResidualLikelihood::known_spread() const {
 }
 
 Eigen::VectorXd ResidualLikelihood::free_spread() const {
-  constexpr double kEven = 1.0 / 3;  // variance of what is even between -1 and 1
+  constexpr double kEven = 1.0 / 3;  // Variance of what is even between -1 and 1. Theory: a third.
   return error_variances().head(free_).cwiseMin(kEven).cwiseSqrt();
 }
 
@@ -141,7 +143,7 @@ ResidualLikelihood::ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd&
   if (free_ > 0) known_.leftCols(free_) = rows.free;
   if (rows.known.cols() > 0) known_.rightCols(rows.known.cols()) = rows.known;
   priors_ = Eigen::VectorXd::Ones(known_.cols());
-  priors_.head(free_).setConstant(kFree);
+  priors_.head(free_).setConstant(free_precision);
   const DiscrepancyModel model(std::move(rows), residuals, repeatability, threads);
   misfit_ = model.misfit();
   misfit_.worth = misfit_.keyframes;

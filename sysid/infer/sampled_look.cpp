@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sysid/infer/agreed_numbers.h"
+
 namespace flash::sysid {
 namespace {
 
@@ -25,7 +27,8 @@ Eigen::VectorXd corner_of(const std::vector<Axis>& axes, bool last) {
 
 /// The least deviance of draws near the ends of each coordinate, over that of all.
 Eigen::ArrayX2d ends_of(const WeightedDraws& draws, const Eigen::VectorXd& low, const Eigen::VectorXd& high) {
-  constexpr double kNear = 0.02;  // of the box
+  // Of the box: draws so near to an end say how likely it is. Chosen: not varied.
+  constexpr double kNear = 0.02;
   Eigen::ArrayX2d ends = Eigen::ArrayX2d::Constant(low.size(), 2, INFINITY);
   const double highest = draws.log_densities.maxCoeff();
   for (Eigen::Index i = 0; i < draws.points.rows(); ++i)
@@ -41,23 +44,26 @@ Eigen::ArrayX2d ends_of(const WeightedDraws& draws, const Eigen::VectorXd& low, 
 }  // namespace
 
 Posterior posterior_of(const std::vector<Axis>& axes, const WeightedDraws& draws) {
-  constexpr Eigen::Index kDraws = 12'800;
+  // Of the density under which the mean is the estimate: near the mode, and no single draw. Chosen: not
+  // varied.
   constexpr double kPower = 8;
   const std::vector<Eigen::Index> searched = searched_of(axes);
   const Eigen::VectorXd low = corner_of(axes, false), high = corner_of(axes, true);
-  Posterior posterior{axes, low, low.transpose().replicate(kDraws, 1), Eigen::ArrayX2d::Zero(low.size(), 2)};
+  Posterior posterior{axes, low, low.transpose().replicate(posterior_draws, 1),
+                      Eigen::ArrayX2d::Zero(low.size(), 2)};
   posterior.estimate(searched) = draws.points.transpose() * weights_of_power(draws, kPower);
-  posterior.samples(Eigen::all, searched) = draws.resampled(kDraws);
+  posterior.samples(Eigen::all, searched) = draws.resampled(posterior_draws);
   posterior.ends(searched, Eigen::all) = ends_of(draws, low(searched), high(searched));
   return posterior;
 }
 
 Sampled sample_extents(const DensityAbout& density, const Extent& start, const std::vector<double>& at,
                        const std::vector<Axis>& axes, const WeightedDraws* before) {
-  constexpr int kRounds = 12;
-  constexpr double kRough = 0.9;       // agreement in a round before the last
-  constexpr double kRoughDraws = 700;  // effective size there, of a surrogate
-  constexpr double kRoughSize = 100;   // and without one
+  constexpr int kRounds = 12;  // Of a look. Work: a cap where the extent does not settle.
+  // Agreement in a round before the last. Work: the last one has what is asked.
+  constexpr double kRough = 0.9;
+  constexpr double kRoughDraws = 700;  // Effective size there, of a surrogate. Work: likewise.
+  constexpr double kRoughSize = 100;   // And without one. Work: likewise.
   const std::vector<Eigen::Index> searched = searched_of(axes);
   Extent extent = start;
   std::vector<double> values = at;

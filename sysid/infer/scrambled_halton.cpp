@@ -29,7 +29,7 @@ std::vector<int> permutation(int count, RandomNumbers& random) {
 }  // namespace
 
 Eigen::MatrixXd scrambled_halton(Eigen::Index count, Eigen::Index dimensions, unsigned seed) {
-  constexpr double kResolution = 0x1p-52;
+  constexpr double kResolution = 0x1p-52;  // Of a coordinate. Work: rounding.
   RandomNumbers random(seed);
   Eigen::MatrixXd points = Eigen::MatrixXd::Zero(count, dimensions);
   int base = 1;

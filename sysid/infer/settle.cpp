@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include "sysid/infer/agreed_numbers.h"
+
 namespace flash::sysid {
 namespace {
 
@@ -25,8 +27,11 @@ std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
 bool ask_for_own_mesh(const Found& found, const std::vector<KnownError>& held,
                       const MotionLikelihood& likelihood,
                       const std::vector<MotionLikelihood::Nuisance>& fitted) {
-  constexpr double kNearer = -1;  // than cells of no size: past the middle
-  constexpr double kSure = 2;     // standard deviations
+  // Standard deviations of the error of the mesh, from cells of no size towards the own mesh, which is at -2.
+  // Theory: past the middle.
+  constexpr double kNearer = -1;
+  // Standard deviations of what the recordings tell of it. Theory: once in twenty.
+  constexpr double kSure = 2;
   const std::vector<KnownError> errors = errors_about(found, held);
   const auto of_mesh = std::find_if(errors.begin(), errors.end(),
                                     [](const KnownError& error) { return error.name == "double_mesh"; });
@@ -115,8 +120,9 @@ struct AtLimit {
 /// Whether motions of the search's own mesh explain the recordings better than those of cells of no size.
 bool own_mesh_explains(const Task& task, Found& found, const Rivals& rivals, const AtLimit& limit,
                        const std::vector<KnownError>& held) {
-  constexpr double kFails = 3;  // of a deviance: strips on either mesh differ by 2 at most
-  constexpr double kUnlikely = 9;
+  // Of a deviance, from which the own mesh explains better. Measured: strips on either mesh differ by 2 at
+  // most.
+  constexpr double kFails = 3;
   const std::vector<Replay> replays = replays_of(found.emulator);
   const MotionLikelihood& likelihood = limit.likelihood;
   const double share = std::exchange(found.emulator.share, own_mesh);
@@ -136,7 +142,7 @@ bool own_mesh_explains(const Task& task, Found& found, const Rivals& rivals, con
   }
   if (score_of(task, replays, best_there) < score_of(task, replays, nearest)) nearest = std::move(best_there);
   const bool by_extrapolation_alone =
-      better > -kFails && !(likelihood.deviance(mode_on_own, task.grid.threads) - of_own < kUnlikely);
+      better > -kFails && !(likelihood.deviance(mode_on_own, task.grid.threads) - of_own < three_deviations);
   return better > kFails || by_extrapolation_alone ||
          ask_for_own_mesh(found, held, likelihood, limit.fitted) ||
          likelier_by_own_measure(task, found, held, nearest, rivals.mode_there) > kFails;
@@ -145,23 +151,24 @@ bool own_mesh_explains(const Task& task, Found& found, const Rivals& rivals, con
 /// Whether the search's best comes nearer to what was observed than the mode, on its mesh and on the
 /// answer's.
 bool best_is_nearer(const Task& task, const Found& found, const Rivals& rivals) {
-  constexpr double kFarther = 1.3;  // of a distance
-  if (!(kFarther * score_of(task, task.replays, rivals.best_on_own) <
+  if (!(much_farther * score_of(task, task.replays, rivals.best_on_own) <
         score_of(task, task.replays, rivals.mode_on_own)))
     return false;
   const std::vector<Replay> replays = replays_of(found.emulator);
   std::vector<ReplayResult> on_own_mesh;
   const auto best_there = simulate_at(task, found.emulator, rivals.best, false, on_own_mesh);
   return best_there &&
-         kFarther * score_of(task, replays, *best_there) < score_of(task, replays, rivals.mode_there);
+         much_farther * score_of(task, replays, *best_there) < score_of(task, replays, rivals.mode_there);
 }
 
 }  // namespace
 
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
                const std::vector<KnownError>& held) {
-  constexpr double kMatters = 1;    // of a deviance
-  constexpr double kLikely = 3.84;  // as verdicts have it
+  // Of a deviance, by which the best candidate has to be likelier than what is emulated. Chosen: not varied.
+  constexpr double kMatters = 1;
+  // Of a deviance, as verdicts have it. Theory: chi-square of one degree of freedom, once in twenty.
+  constexpr double kLikely = 3.84;
   const std::optional<Rivals> rivals = simulate_rivals(task, found, best);
   if (!rivals) return Settled::elsewhere;
   const std::vector<double>& mode = rivals->mode;

@@ -28,6 +28,8 @@ Eigen::ArrayXXd cosines(const Eigen::ArrayXd& x, const std::vector<Mode>& modes,
 }  // namespace
 
 SheetModes sheet_modes(const Eigen::MatrixX2d& places) {
+  // Cosines along the sheet, of least wave number. Chosen: about five along each side of a square; not
+  // varied.
   constexpr int kModes = 24;
   const Eigen::RowVector2d corner = places.colwise().minCoeff();
   const Eigen::Vector2d sides = (places.colwise().maxCoeff() - corner).transpose().cwiseMax(1e-9);

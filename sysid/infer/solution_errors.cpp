@@ -51,6 +51,7 @@ KnownError error_of(const char* name, const Shared& from, const Shared& to, bool
 
 // What lies beyond a difference between two meshes or steps, over it, where halving again leaves this share.
 double beyond(double ratio) { return ratio / (1 - ratio); }
+/// Share of an error that halving leaves, of first and of second order. Theory: 1/2 and 1/4.
 constexpr double kFirstOrder = 0.5, kSecondOrder = 0.25;
 
 /// Motions on other cells as the search's own mesh has them: on a sixteenth of the vertices.
@@ -157,7 +158,9 @@ std::vector<KnownError> errors_of_cells(const Task& task, const Emulator& emulat
 }
 
 bool has_left_cells(const Posterior& posterior, const std::vector<KnownError>& errors) {
-  constexpr double kFar = 0.5;  // standard deviations
+  // Standard deviations of the posterior: an estimate that moved farther has its cells halved anew. Chosen:
+  // not varied.
+  constexpr double kFar = 0.5;
   const auto error = find(errors, half_sheet_cells);
   if (error == errors.end() || !error->corrects) return false;
   for (std::size_t k = 0; k < posterior.axes.size(); ++k) {

@@ -44,7 +44,7 @@ bool follow_with_cells(const Task& task, const std::vector<double>& values, std:
 std::vector<KnownError> errors_of_step(const Task& task, const std::vector<double>& values);
 
 /// What both simulate beside the estimate itself and half the step, a recording, at most; cells as often
-/// again as follow_with_cells does.
+/// again as follow_with_cells does. Work.
 inline constexpr int motions_of_solution = 7;
 
 /// Of which replays that is.
@@ -66,8 +66,8 @@ struct Difference {
 };
 double observed_ratio(const Difference& first, const Difference& second);
 
-/// From this ratio on the two halvings do not tell where the next ones lead. The extrapolation assumes no
-/// more than 1/2, and what it leaves to chance allows for no more than 3/4.
+/// From this ratio on the two halvings do not tell where the next ones lead; it is 1/2 at first order.
+/// Chosen: half-way from first order to none; not varied.
 inline constexpr double most_ratio = 0.75;
 
 inline constexpr const char* half_sheet_cells = "half_sheet_cells";

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kMostLog = 300;  // whose square of the exponential is finite
+constexpr double kMostLog = 300;  // Of a weight. Work: the square of the exponential is finite.
 
 /// 1 for weights of 1, given by their logarithms: 1 / (1 + mean (w - 1)^2), which is the effective size over
 /// the number where their mean is 1. That a surrogate is off by a constant counts, too: it is so where it is
@@ -21,7 +21,7 @@ double agreement_of(const Eigen::VectorXd& logs) {
 
 /// In which draws look like a Gaussian.
 BentStudent coordinates_of(const WeightedDraws& draws, const Eigen::VectorXd& width) {
-  constexpr double kLeast = 1e-6;  // of the box
+  constexpr double kLeast = 1e-6;  // Of the box. Work: rounding.
   const Eigen::MatrixXd prior = (kLeast * width).cwiseAbs2().asDiagonal();
   return fitted_student(draws.points, draws.weights, prior);
 }
@@ -47,6 +47,7 @@ class Asking {
 /// Of draws of a density like the one at hand, those inside of a box, from the tails too.
 Eigen::MatrixXd first_points(const WeightedDraws& before, const Eigen::VectorXd& low,
                              const Eigen::VectorXd& high) {
+  // Of a density like the one at hand, so that tails are asked for. Work.
   constexpr double kPower = 0.5;
   const Index count = 2 * quadratic_coefficients(low.size());
   const Eigen::MatrixXd points =
@@ -62,8 +63,9 @@ Eigen::MatrixXd first_points(const WeightedDraws& before, const Eigen::VectorXd&
 /// Draws that show where the density is likely.
 WeightedDraws located(Asking& ask, const Eigen::VectorXd& low, const Eigen::VectorXd& high,
                       const SurrogateSettings& settings, const AskedPoints& asked) {
+  // Points a coordinate that come first, and of a batch. Work: they locate, and do not count.
   constexpr int kFirst = 24, kBatch = 32;
-  constexpr double kEnough = 30;  // effective size a coordinate
+  constexpr double kEnough = 30;  // Effective size a coordinate that locates. Work: likewise.
   const Index d = low.size();
   if (settings.before != nullptr && asked.size() == 0) {
     const Eigen::MatrixXd points = first_points(*settings.before, low, high);
@@ -93,12 +95,16 @@ Eigen::VectorXd weights_of_power(const WeightedDraws& draws, double power) {
 SurrogateDraws sample_by_surrogate(const LogDensities& log_densities, const Eigen::VectorXd& low,
                                    const Eigen::VectorXd& high, AskedPoints& asked,
                                    const SurrogateSettings& settings) {
-  constexpr double kPower = 0.5;  // of the draws for the tails
-  constexpr double kTrusted =
-      0.6;  // agreement of draws that tell coordinates; without a likely one it is 0.5
-  constexpr double kLeast =
-      0.75;  // agreement of draws that may stand; half of them cells that are empty: 2 / 3
+  // Of the density, for the draws of the tails. Work: these are asked for, and not kept.
+  constexpr double kPower = 0.5;
+  // Agreement of draws that tell coordinates; without a likely one it is 0.5. Work: a surrogate, whose draws
+  // are tried.
+  constexpr double kTrusted = 0.6;
+  // Agreement of draws that may stand. Half of them in cells that are empty have 2 / 3. Chosen: above that;
+  // not varied.
+  constexpr double kLeast = 0.75;
   const Index d = low.size(), fresh = 4 * (d + 1), tails = 2 * (d + 1);
+  // Surrogates in a row that have hardly any likely draw. Work: then the likelihood itself is sampled.
   constexpr int kTries = 4;
   Asking ask(log_densities, asked);
   SurrogateDraws found;

@@ -43,8 +43,10 @@ double TimeLeft::duration(SearchStage stage) const {
 }
 
 std::optional<double> TimeLeft::seconds(double at) const {
-  constexpr double kOverdue = 0.1;  // of its duration is left of a stage, at least
-  constexpr double kMore = 1;       // lattice that follows another, as a rule, however many there were
+  // Of its duration is left of a stage, at least. Work: for the time left alone.
+  constexpr double kOverdue = 0.1;
+  // Lattice that follows another, as a rule, however many there were. Work: for the time left alone.
+  constexpr double kMore = 1;
   if (!seconds_each()) return std::nullopt;
   const double own = duration(stage_);
   double left = stage_ == SearchStage::candidates ? own : std::max(own - (at - began_), kOverdue * own);

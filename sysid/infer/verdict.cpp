@@ -11,7 +11,11 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kExcluded = data::chi_square_95_of_1;  // deviance over the least
+/// Deviance over the least, from which an end of the range is excluded. Theory: chi-square of one degree of
+/// freedom, once in twenty.
+constexpr double kExcluded = data::chi_square_95_of_1;
+/// Bits of the usual range, from which a parameter is told. Chosen: what told means: the interval is at most
+/// half of what fabrics have.
 constexpr double kLeastBits = 1;
 
 /// As coordinates of an axis.

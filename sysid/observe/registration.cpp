@@ -9,7 +9,7 @@
 namespace flash::sysid {
 namespace {
 
-constexpr int kParameters = 5;  // offset x, y, z, yaw, time
+constexpr int kParameters = 5;  // Offset x, y, z, yaw, time. Work.
 constexpr const char* kNames[kParameters] = {"offset_x", "offset_y", "offset_z", "yaw", "time"};
 
 Eigen::Matrix<double, kParameters, 1> half_widths(const RegistrationBounds& bounds) {

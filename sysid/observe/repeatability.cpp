@@ -21,8 +21,11 @@ using data::Points;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double reach_in_spacings = 3;  ///< within which the other trial saw a point
-constexpr double softening = 5e-4;       ///< distance below which residuals count as quadratic [m]
+/// Spacings of points within which the other trial saw a point. Chosen: not varied.
+constexpr double reach_in_spacings = 3;
+/// Distance below which residuals count as quadratic [m]. Chosen: below the noise of depth cameras; not
+/// varied.
+constexpr double softening = 5e-4;
 constexpr double unseen = std::numeric_limits<double>::quiet_NaN();
 
 /// The surface that a cloud shows.
@@ -214,7 +217,7 @@ struct DistanceFunctor : Eigen::DenseFunctor<double> {
 
   /// Central differences. The planes of all evaluations face to the same sides.
   int df(const VectorXd& x, Eigen::MatrixXd& jacobian) const {
-    constexpr double step = 0.02;  // of a bound
+    constexpr double step = 0.02;  // Of a bound, for central differences. Work.
     Points normals = Points::Zero(values(), 3);
     VectorXd here, above, below;
     evaluate(x, normals, here);
@@ -308,7 +311,8 @@ double diagonal_of(const Points& rest) {
 }
 
 void check_same_sheet(const data::Recording& first, const data::Recording& second) {
-  constexpr double kSame = 0.02;  // of the diagonal: meshes of one cloth may be cut to whole cells
+  // Of the diagonal: meshes of one cloth may be cut to whole cells. Work: a refusal.
+  constexpr double kSame = 0.02;
   const double one = diagonal_of(first.mesh.vertices), other = diagonal_of(second.mesh.vertices);
   if (std::abs(one - other) > kSame * one)
     throw data::input_error(second.source, "object.mesh",
@@ -330,7 +334,7 @@ void check_window(const data::Recording& first, const Trial& a, const data::Reco
             data::format_short(trial->keyframes.front().time) + " to " +
             data::format_short(trial->keyframes.back().time) + " s";
   }
-  constexpr double kOpen = 1e200;  // an end that was not given is beyond [s]
+  constexpr double kOpen = 1e200;  // An end that was not given is beyond [s]. Work.
   const auto end = [](const char* option, double value) {
     return std::abs(value) < kOpen ? std::string(option) + " " + data::format_short(value) : "";
   };

@@ -53,7 +53,9 @@ std::optional<CoarseCells> coarse_cells(const std::vector<Replay>& replays, cons
 
 namespace {
 
-constexpr double kLeast = 0.5;  // of the cells of the search: those of an answer
+/// Of the cells of the search: those of an answer. Chosen: by what they cost, four times the vertices; not
+/// varied.
+constexpr double kLeast = 0.5;
 
 std::string mm(double length) { return data::format_short(std::round(1e4 * length) / 10) + " mm"; }
 
@@ -65,7 +67,7 @@ std::vector<Replay> on_cells_for_fold(const std::vector<Replay>& replays, const 
   const auto coarse = coarse_cells(replays, candidate, most_of_fold_of_answer);
   if (!coarse) return {};
   // Cells that shrink towards a grasp take less of a sheet, the smaller the others are: the typical one does
-  // not fall by the factor.
+  // not fall by the factor. Work: a cap.
   constexpr int kTries = 4;
   double factor = std::max(kLeast, made_for_fold * coarse->radius / coarse->cell);
   std::vector<Replay> smaller = on_smaller_cells(replays, factor);
@@ -85,7 +87,8 @@ std::string cells_for_fold_text(const std::vector<Replay>& replays, const std::v
 }
 
 std::string coarse_cells_text(const CoarseCells& coarse) {
-  constexpr double kOfPattern = 1.08;  // typical cell over that of a specification, of right triangles
+  // Typical cell over that of a specification, of right triangles. Work: for a text.
+  constexpr double kOfPattern = 1.08;
   return "cells of " + mm(coarse.cell) + " are coarse for a sheet that leaves the table in a fold of about " +
          mm(coarse.radius) +
          ": friction and bending may be off by a few percent more than is said of them. Search on cells "

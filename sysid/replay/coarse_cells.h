@@ -20,10 +20,10 @@ struct CoarseCells {
   double cell = 0, radius = 0;  ///< [m]
 };
 
-inline constexpr double most_of_fold = 0.5;
+inline constexpr double most_of_fold = 0.5;  // Of its radius. Measured: as next (docs/validation/grasp.md).
 
-/// The share that cells of an answer take where they are made for the fold (on_cells_for_fold), and the one
-/// from which on they are.
+/// The share that cells of an answer take where they are made for the fold, and that from which on they are.
+/// Measured: on these cells the three worst misses of D hold (docs/validation/grasp.md).
 inline constexpr double made_for_fold = 0.375, most_of_fold_of_answer = 1.05 * made_for_fold;
 
 /// Of the first recording in which they take more than `most` of the radius; empty where there is none: cells

@@ -30,7 +30,7 @@ Eigen::Vector3d mean(const Eigen::Matrix3d& corners, const Eigen::Vector3d& bary
 }  // namespace
 
 Mark put_mark(const Eigen::Vector3d& place, const data::TriangleMesh& rest, const SurfacePoint& nearest) {
-  constexpr double kOn = 1e-9;  // [m]
+  constexpr double kOn = 1e-9;  // From the surface [m]. Work: rounding.
   Mark mark{nearest.triangle, nearest.barycentric};
   if (nearest.distance > kOn)
     mark.offset = frame_of(corners_of(rest.vertices, rest.triangles, nearest.triangle)).transpose() *

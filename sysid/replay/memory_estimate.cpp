@@ -52,7 +52,8 @@ void check_job(const std::vector<Replay>& replays, double candidates, const Memo
                            " MB of memory are needed, expected at most the " + megabytes(limit) +
                            " MB that there are: use " + remedy);
   }
-  // Faster than any machine: the refusal must be certain.
+  // Vertices times steps a second, faster than any machine, and the longest search [s]. Work: the refusal
+  // must be certain.
   constexpr double kWorkPerSecond = 1e7, kLongest = 365 * 86400.0;
   const double seconds = work / (kWorkPerSecond * std::max(1, first.settings.threads));
   if (seconds <= kLongest) return;

@@ -14,7 +14,7 @@ struct MemoryEstimate {
   double total() const { return program + simulation + kept; }
 };
 
-/// What one position of one vertex takes [bytes].
+/// What one position of one vertex takes [bytes]. Work.
 inline constexpr double bytes_per_position = 3 * sizeof(double);
 
 /// Number of vertices of the sheet or solid that is simulated.

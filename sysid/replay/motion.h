@@ -17,7 +17,7 @@ struct Motion {
       forces{};  ///< last gripper on sheet, in each step: one fewer than positions [N]
 };
 
-/// Share of a step within which a time is that of the step itself.
+/// Share of a step within which a time is that of the step itself. Work: rounding.
 constexpr double kSameStep = 1e-6;
 
 /// Positions at time t, linear between steps, held outside the simulated span; `velocities` [m/s], when asked

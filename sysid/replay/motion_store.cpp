@@ -32,8 +32,9 @@ namespace {
 
 constexpr std::string_view kMagic = "flash-rollout/4\n";
 constexpr const char* kExtension = ".rollout";
-constexpr std::size_t kDigest = 64;                           // hexadecimal digits of a SHA-256
-constexpr std::size_t kHeader = kMagic.size() + 2 * kDigest;  // the key, and the sum of what follows
+constexpr std::size_t kDigest = 64;  // Hexadecimal digits of a SHA-256. Work.
+/// The key, and the sum of what follows [bytes]. Work.
+constexpr std::size_t kHeader = kMagic.size() + 2 * kDigest;
 
 /// Numbers as the bytes they are.
 class Bytes {
@@ -353,7 +354,7 @@ void MotionStore::wait_for(std::vector<MissingMotion> missing) const {
     const std::vector<WantedMotion> taken = take_of_absent(missing);
     simulate(taken, {});
     if (!taken.empty()) continue;
-    constexpr double kOften = 0.2, kSeldom = 2;  // of looking for files [s]
+    constexpr double kOften = 0.2, kSeldom = 2;  // Of looking for files [s]. Work.
     std::this_thread::sleep_for(std::chrono::duration<double>(std::clamp(0.05 * waited, kOften, kSeldom)));
   }
 }

@@ -65,8 +65,8 @@ void replace_mesh(const std::string& mesh, data::Recording& recording) {
     return (each.vertices.colwise().maxCoeff() - each.vertices.colwise().minCoeff()).transpose();
   };
   const Eigen::Vector3d was = size_of(own), is = size_of(recording.mesh);
-  constexpr double kOther =
-      0.25;  // of the largest side: cells of another size and a new measurement stay below
+  // Of the largest side: cells of another size and a new measurement stay below. Work: a refusal.
+  constexpr double kOther = 0.25;
   if ((was - is).cwiseAbs().maxCoeff() > kOther * was.maxCoeff()) {
     const auto text = [](const Eigen::Vector3d& size) {
       return data::format_short(size.x()) + " x " + data::format_short(size.y()) + " x " +

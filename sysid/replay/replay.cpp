@@ -89,7 +89,7 @@ void check_patch(const Replay& replay) {
 int count_steps(const data::Recording& recording, double start, double step) {
   const double first = recording.keyframes.front().time, last = recording.keyframes.back().time;
   const double duration = last + recording.nuisance.time - start;
-  constexpr double kUsual = 600;  // what takes longer is at fault itself [s]
+  constexpr double kUsual = 600;  // What takes longer is at fault itself [s]. Work: a refusal.
   if (duration > kUsual && duration / step > data::max_steps)
     throw data::input_error(recording.source, first - start > last - first ? "grasps.from" : "keyframes",
                             "found " + data::format_short(first - start) +

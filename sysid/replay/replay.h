@@ -40,7 +40,7 @@ struct ReplaySettings {
   std::vector<int> cuda_devices{};        ///< which share them; empty: the first
 };
 
-/// Stiffness of pads that do not give way [N/m^3].
+/// Stiffness of pads that do not give way [N/m^3]. Theory: stands for infinity.
 inline constexpr double rigid_pads = 1e12;
 
 /// How the sheet lay and how it was grasped: what the recording leaves open and what changes the motion.

@@ -28,9 +28,9 @@ extern const SurfaceKernels surface_kernels;
 
 namespace {
 
-constexpr int width = surface_width;
+constexpr int width = surface_width;  // Work: as there.
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int most_levels = 11;  // 8^11 packets are more than an int counts
+constexpr int most_levels = 11;  // 8^11 packets are more than an int counts. Work.
 
 const SurfaceKernels& surface_kernels_of([[maybe_unused]] sim::InstructionLevel level) {
 #ifdef __x86_64__

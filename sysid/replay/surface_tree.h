@@ -4,7 +4,7 @@ namespace flash::sysid {
 
 // What the search in sysid/replay/kernels reads: plain arrays alone, as in sim/cpu/kernels.h.
 
-/// Triangles of a packet, children of a node.
+/// Triangles of a packet, children of a node. Work.
 inline constexpr int surface_width = 8;
 
 /// Eight triangles, coordinate by coordinate: corner a, edges e = b - a and f = c - a, normal n = e x f and

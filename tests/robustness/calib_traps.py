@@ -271,8 +271,8 @@ def traps():
         yield Trap(f"{other}: quaternions w x y z", sound, poses_changed(w_first), 2, "quaternions are w x y z")
         yield Trap(f"{other}: target ten times too large", sound, option("--target", "chessboard:9x6:0.25"), 2,
                    "the target is 0.1")
-        yield Trap(f"{other}: board transposed", sound, option("--target", "chessboard:6x9:0.025"), 0, used=16)
-        yield Trap(f"{other}: outer corners", sound, option("--target", "chessboard:11x8:0.025"), 2,
+        yield Trap(f"{other}: board transposed", sound, both(first_views(8), option("--target", "chessboard:6x9:0.025")), 0, used=8)
+        yield Trap(f"{other}: outer corners", sound, both(first_views(6), option("--target", "chessboard:11x8:0.025")), 2,
                    "show one of 9x6 inner corners")
         yield Trap(f"{other}: angles as they should be", sound, as_angles("rx,ry,rz", 1), 0, used=16)
         yield Trap(f"{other}: degrees for radians", sound, as_angles("rx,ry,rz", math.degrees(1)), 2, "degrees?")
@@ -343,7 +343,7 @@ def traps():
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")
     yield Trap("one axis", "one_axis", nothing, 0, "is not told", "turns about that axis alone", used=8)
     yield Trap("one axis, a noisy robot", "one_axis_noisy", nothing, 0, "is not told", used=12)
-    yield Trap("flipped boards", "flipped", nothing, 0, "numbered from its other end", used=16)
+    yield Trap("flipped boards", "flipped", nothing, 0, "numbered from its other end", used=8)
 
 
 def draw(tool, work):
@@ -353,7 +353,7 @@ def draw(tool, work):
     program.must(tool, work / "late", "eye-in-hand", BOARD, 12, "640x480", "0.02", "0.2", 7, "motion=stream", "time_offset=0.03")
     program.must(tool, work / "one_axis", "eye-in-hand", BOARD, 8, *common, 3, "motion=one-axis")
     program.must(tool, work / "one_axis_noisy", "eye-in-hand", BOARD, 12, "640x480", "0.3", "0.5", 5, "motion=one-axis")
-    program.must(tool, work / "flipped", "eye-in-hand", PLAIN, 16, *common, 4)
+    program.must(tool, work / "flipped", "eye-in-hand", PLAIN, 8, *common, 4)
 
 
 def far_off(result, truth):

@@ -451,8 +451,7 @@ def all_cases(first_frame):
 def complaint(case, commands, sound, work):
     """What is wrong with how the program took the damage; empty where nothing is."""
     folder = work / "damaged"
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(sound, folder)
+    program.renew(sound, folder)
     case.damage(folder)
     entries = set(folder.rglob("*"))
     files = {path: path.read_bytes() for path in entries if path.is_file()}

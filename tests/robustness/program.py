@@ -1,5 +1,7 @@
 """The programs under test, and recordings that they make themselves."""
+import functools
 import json
+import shutil
 import subprocess
 
 ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.2:0.05:alternating", "element_type": "TRIANGLE",
@@ -16,6 +18,31 @@ def must(program, *words):
     if done.returncode != 0:
         raise SystemExit(f"{program} {' '.join(map(str, words))}: exit code {done.returncode}\n{done.stderr}")
     return done
+
+
+@functools.lru_cache(maxsize=1)
+def contents(folder):
+    """The files of a folder that stays as it is, and its folders as None."""
+    return {path.relative_to(folder): path.read_bytes() if path.is_file() else None for path in sorted(folder.rglob("*"))}
+
+
+def renew(sound, folder):
+    """Makes `folder` what `sound` is, which stays as it is. Only what differs is written: ext4 is slow to make files where others
+    were just removed."""
+    known = contents(sound)
+    folder.mkdir(exist_ok=True)
+    for path in sorted(folder.rglob("*"), reverse=True):  # what is in a folder before it
+        name = path.relative_to(folder)
+        as_known = name in known and not path.is_symlink() and (path.is_dir() if known[name] is None else path.is_file())
+        if not as_known:
+            path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+    for name, content in known.items():
+        path = folder / name
+        if content is None:
+            path.mkdir(exist_ok=True)
+        elif not path.exists() or path.read_bytes() != content:
+            path.write_bytes(content)
+            shutil.copystat(sound / name, path)
 
 
 def conclude(results):

@@ -210,8 +210,7 @@ def resumed(sysid, sound, work):
                          ("lines that end in CRLF", rewritten("run/results.csv", lambda c: c.replace(b"\n", b"\r\n"))),
                          ("summary of another search", copied("summary.json"))):
         folder = work / "killed"
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(sound, folder)
+        program.renew(sound, folder)
         damage(folder)
         done = program.call(*commands["resume"](folder), "--quiet")
         yield done.returncode in (0, 3), f"resume, {name}: exit code {done.returncode}: {done.stderr}"

@@ -1,9 +1,13 @@
 #include "sysid/capture/segment/segment.h"
 
+// Without PCL's library of segmentation, which takes two thirds of the start of a program: what is needed of
+// it stands in headers.
 #include <pcl/filters/statistical_outlier_removal.h>
+#include <pcl/sample_consensus/ransac.h>
+#include <pcl/sample_consensus/sac_model_perpendicular_plane.h>
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
-#include <pcl/segmentation/sac_segmentation.h>
+#include <pcl/segmentation/impl/extract_clusters.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -93,13 +97,12 @@ std::vector<int> main_clusters(const data::Points& points, const std::vector<int
                                const std::set<StillCell>& still) {
   if (rows.empty()) return {};
   const Cloud::Ptr cloud = to_pcl(points, rows, origin_of(points, rows));
-  pcl::EuclideanClusterExtraction<pcl::PointXYZ> extraction;
-  extraction.setInputCloud(cloud);
-  extraction.setSearchMethod(std::make_shared<pcl::search::KdTree<pcl::PointXYZ>>());
-  extraction.setClusterTolerance(cluster_gap(cloud, settings));
-  extraction.setMinClusterSize(settings.cluster_points);
   std::vector<pcl::PointIndices> clusters;
-  extraction.extract(clusters);
+  const auto tree = std::make_shared<pcl::search::KdTree<pcl::PointXYZ>>();
+  tree->setInputCloud(cloud);
+  pcl::extractEuclideanClusters<pcl::PointXYZ>(*cloud, tree, static_cast<float>(cluster_gap(cloud, settings)),
+                                               clusters, settings.cluster_points);
+  std::sort(clusters.rbegin(), clusters.rend(), pcl::comparePointClusters);
   std::vector<std::vector<int>> moving, background;
   for (const pcl::PointIndices& found : clusters) {
     std::vector<int> cluster;
@@ -144,20 +147,16 @@ std::string degrees(double radians) {
 std::vector<int> largest_plane(const data::Points& points, const std::vector<int>& rows,
                                const SegmentSettings& settings) {
   if (rows.size() < 3) return {};
-  pcl::SACSegmentation<pcl::PointXYZ> ransac;
-  ransac.setInputCloud(to_pcl(points, rows, origin_of(points, rows)));
-  ransac.setModelType(pcl::SACMODEL_PERPENDICULAR_PLANE);
-  ransac.setMethodType(pcl::SAC_RANSAC);
-  ransac.setAxis(settings.up.cast<float>());
-  ransac.setEpsAngle(settings.plane_tilt);
-  ransac.setDistanceThreshold(settings.plane_tolerance);
+  const auto model = std::make_shared<pcl::SampleConsensusModelPerpendicularPlane<pcl::PointXYZ>>(
+      to_pcl(points, rows, origin_of(points, rows)));
+  model->setAxis(settings.up.cast<float>());
+  model->setEpsAngle(settings.plane_tilt);
+  pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, settings.plane_tolerance);
   ransac.setMaxIterations(1000);
-  ransac.setOptimizeCoefficients(false);
-  pcl::ModelCoefficients coefficients;
-  pcl::PointIndices inliers;
-  ransac.segment(inliers, coefficients);
+  pcl::Indices inliers;
+  if (ransac.computeModel()) ransac.getInliers(inliers);
   std::vector<int> plane;
-  for (const int index : inliers.indices) plane.push_back(rows[index]);
+  for (const int index : inliers) plane.push_back(rows[index]);
   std::sort(plane.begin(), plane.end());
   return plane;
 }
