@@ -72,10 +72,10 @@ def _unit(name, settings):
 
 
 def _samples(summary):
-    columns = dict(zip(summary["axes"], np.array(summary["samples"], float).reshape(-1, len(summary["axes"])).T))
+    count = len(summary["samples"])
+    columns = dict(zip(summary["axes"], np.array(summary["samples"], float).reshape(count, len(summary["axes"])).T))
     if summary.get("sample_weights"):
         columns["density" if "element_type" in summary["settings"] else "areal_density"] = np.array(summary["sample_weights"], float)
-    count = len(summary["samples"])
     samples = np.zeros(count, [(name, np.float64) for name in [*columns, "weight"]])
     for name, column in columns.items():
         samples[name] = column
