@@ -65,32 +65,6 @@ void check_distance(const CLI::App& verb, const std::string& distance) {
                              ", expected --distance " + of + " beside it");
 }
 
-/// As though the asset itself held the constants.
-data::Asset with_fixed(data::Asset asset, const std::vector<sysid::Axis>& fixed) {
-  for (const sysid::Axis& axis : fixed) {
-    const double value = axis.values.front();
-    if (axis.name == "young") asset.young = value;
-    if (axis.name == "poisson") asset.poisson = value;
-    if (axis.name == "bending") {
-      asset.bending_rigidity = value;
-      if (asset.published_bending.has_value() && !asset.bending_model)
-        asset.bending_model = data::BendingModel::isometric;
-      asset.published_bending.reset();
-    }
-    if (axis.name == "areal_density" && asset.element_type == data::ElementType::triangle) {
-      asset.areal_density = value;
-      for (std::optional<double>* other : {&asset.density, &asset.mass, &asset.object_mass}) other->reset();
-    }
-    if (axis.name == "density" && asset.element_type == data::ElementType::tetrahedron) {
-      asset.density = value;
-      for (std::optional<double>* other : {&asset.mass, &asset.object_mass}) other->reset();
-    }
-    for (const char* name : {"young", "poisson", "bending", "areal_density", "density"})
-      if (axis.name == name) asset.source += " --hold " + axis.name + "=" + data::format_short(value);
-  }
-  return asset;
-}
-
 bool observes(const data::RecordedKeyframe& keyframe, const std::string& term) {
   return (term == "cloud" && !(keyframe.cloud + keyframe.depth).empty()) ||
          (term == "contour" && !keyframe.contour.empty()) ||
@@ -427,40 +401,12 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
   return data::load_asset(recording.asset);
 }
 
-void check_kind(const data::Asset& asset, const data::Recording& recording) {
-  const bool solid = asset.element_type == data::ElementType::tetrahedron;
-  if (solid == recording.is_solid()) return;
-  throw data::input_error(asset.source, "element_type",
-                          std::string("found ") + (solid ? "TETRAHEDRON" : "TRIANGLE") + ", expected " +
-                              (solid ? "TRIANGLE" : "TETRAHEDRON") + ", as object.mesh of " +
-                              recording.source + " is a " + (solid ? "sheet" : "solid"));
-}
-
 void check_options(const ReplayOptions& options, const data::Asset& asset,
                    const std::vector<data::Recording>& recordings) {
   check_observed(options, recordings);
   if (asset.element_type == data::ElementType::tetrahedron && options.clamp_slopes)
     throw data::InputError(
         "--clamp-slopes: found a solid, expected a sheet: a solid has no slopes of its own");
-}
-
-sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sheet,
-                                  std::vector<std::string>& notices, const std::vector<sysid::Axis>& fixed) {
-  sysid::MaterialBase base;
-  std::vector<std::string> said;
-  if (asset.element_type == data::ElementType::tetrahedron) {
-    const double volume = sheet.vertex_volume.sum();
-    base.solid = data::resolve_solid(asset, volume).material;
-    said = data::resolve_solid(with_fixed(asset, fixed), volume).notices;
-  } else {
-    const double area = sheet.vertex_area.sum();
-    base.material = data::resolve_sheet(asset, area).material;
-    base.thickness = asset.thickness;
-    base.bending_from_thickness = asset.thickness && !asset.bending_rigidity && !asset.published_bending;
-    said = data::resolve_sheet(with_fixed(asset, fixed), area).notices;
-  }
-  notices.insert(notices.end(), said.begin(), said.end());
-  return base;
 }
 
 }  // namespace flash

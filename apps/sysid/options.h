@@ -7,6 +7,7 @@
 #include "data/asset/asset.h"
 #include "sim/device.h"
 #include "sysid/emulate/grid_search.h"
+#include "sysid/emulate/material_base.h"
 #include "sysid/emulate/search_warnings.h"
 #include "sysid/replay/replay.h"
 
@@ -106,20 +107,13 @@ std::vector<data::Recording> load_recordings(const std::vector<std::string>& pat
 /// The asset named on the command line or, without one, by the recording.
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
 
-/// Throws data::InputError where the recording is of a sheet and the asset of a solid, or the other way
-/// round.
-void check_kind(const data::Asset& asset, const data::Recording& recording);
+using sysid::check_kind;
+using sysid::material_base;
 
 /// Throws InputError where an option is of sheets alone and the object is a solid, or of what no recording
 /// has: the noise of forces where none was measured, an error in common with no other recording.
 void check_options(const ReplayOptions& options, const data::Asset& asset,
                    const std::vector<data::Recording>& recordings);
-
-/// The asset's material; what was understood, with `fixed` in place of the asset's values, is appended to
-/// `notices`.
-sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sheet,
-                                  std::vector<std::string>& notices,
-                                  const std::vector<sysid::Axis>& fixed = {});
 
 /// Says what is known before a search and makes its answer worse.
 void tell_known_before(const CommonOptions& options, const std::vector<sysid::Replay>& replays,

@@ -17,16 +17,13 @@
 #include "data/files/writable.h"
 #include "data/mesh/mesh_io.h"
 #include "data/mesh/procedural_mesh.h"
-#include "data/recording/recording_digest.h"
 #include "sim/newton/accepted.h"
 #include "sysid/observe/horizon.h"
 #include "sysid/observe/registration_parameter.h"
-#include "sysid/replay/grasp_mesh.h"
 #include "sysid/replay/memory_estimate.h"
-#include "sysid/report/identified_recording.h"
+#include "sysid/report/asset_replay.h"
 #include "sysid/report/overlay.h"
 #include "sysid/report/overlay_image.h"
-#include "sysid/report/searched_mesh.h"
 #include "sysid/report/settings_texts.h"
 
 namespace flash {
@@ -146,17 +143,11 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
       sim::choose_device(options.common.device == "auto" ? "cpu" : options.common.device);
   simulated.device = device.device;
   simulated.cuda_devices = device.cuda_devices;
-  simulated.element_order = asset.element_order;
-  const std::optional<sysid::IdentifiedRecording> identified =
-      sysid::identified_recording(asset, data::recording_sha256(recording));
-  const bool as_answered = identified && simulated.mesh.empty();
-  if (as_answered) {
-    sysid::expect_as_searched(identified->mesh, asset.source, "identification.recordings.mesh");
-    simulated.mesh = identified->mesh.mesh;
-    simulated.cell_scale = identified->mesh.cell_scale;
-  }
-  sysid::Replay replay = sysid::make_replay(recording, simulated);
-  if (as_answered && (simulated.cell_scale < 1 || replay.recording.mesh_spec != recording.mesh_spec))
+  sysid::AssetReplay ready = sysid::make_asset_replay(recording, asset, simulated);
+  sysid::Replay& replay = ready.replay;
+  const std::optional<sysid::IdentifiedRecording>& identified = ready.identified;
+  if (ready.as_answered &&
+      (replay.settings.cell_scale < 1 || replay.recording.mesh_spec != recording.mesh_spec))
     say(options.common, recording.name + ": the mesh is " +
                             sysid::settings_texts({replay}, sysid::GridSettings{}).at("mesh") +
                             ", that of the answer behind the asset; --mesh replaces that");
@@ -165,10 +156,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   std::vector<std::string> notices;
   const std::vector<sysid::Axis> axes = parse_values(options.holds);
   const sysid::MaterialBase base = material_base(asset, replay.sheet(), notices, axes);
-  sysid::check_axes(axes, base);
-  sysid::check_grasp_axes(axes, {replay});
-  std::vector<double> values;
-  for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
+  const sysid::ReplayCandidate candidate = sysid::candidate_of(ready, base, axes);
   sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1, options.every_step));
   data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
@@ -179,15 +167,10 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
     warn(line);
 
   if (identified && !options.no_horizon) keep_predictable(*identified, options.common, replay);
-
-  sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
-  if (identified && identified->grasp_size && !candidate.nuisance.grasp_size &&
-      sysid::grasp_size(replay.recording, replay.settings)) {
-    candidate.nuisance.grasp_size = identified->grasp_size;
+  if (sysid::has_found_grasp_size(ready, axes))
     say(options.common, replay.recording.name + ": the patch is " +
                             data::format_short(1e3 * *identified->grasp_size) +
                             " mm, as the search behind the asset found; --hold grasp_size=... replaces that");
-  }
   sysid::ReplayResult motion;
   sysid::run(replay, {candidate}, options.every_step ? every_step(replay) : scored_steps(replay),
              [&](std::size_t, sysid::ReplayResult result) { motion = std::move(result); });

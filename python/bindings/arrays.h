@@ -2,7 +2,10 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <cstddef>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "sim/tensor.h"
 
@@ -17,6 +20,24 @@ sim::Tensor tensor_of(const Numbers& numbers);
 /// A read-only array on the memory of a tensor, which `owner` keeps alive as long as the array lives: one of
 /// numpy, or on a CUDA device an object that DLPack takes.
 nanobind::object view_of(const sim::Tensor& tensor, const std::shared_ptr<const void>& owner);
+
+/// An array of numpy that has the numbers for its own.
+template <class Number>
+nanobind::ndarray<nanobind::numpy, Number> array_of(std::vector<Number> numbers,
+                                                    const std::vector<std::size_t>& shape) {
+  auto* const kept = new std::vector<Number>(std::move(numbers));
+  const nanobind::capsule owner(kept,
+                                [](void* own) noexcept { delete static_cast<std::vector<Number>*>(own); });
+  return {kept->data(), shape.size(), shape.data(), owner};
+}
+
+/// The same of a matrix that is kept row by row.
+template <class Matrix>
+nanobind::ndarray<nanobind::numpy, typename Matrix::Scalar> array_of(const Matrix& rows) {
+  static_assert(Matrix::IsRowMajor);
+  return array_of(std::vector<typename Matrix::Scalar>(rows.data(), rows.data() + rows.size()),
+                  {static_cast<std::size_t>(rows.rows()), static_cast<std::size_t>(rows.cols())});
+}
 
 /// What arrays on a device need: `to_host` copies one to numpy, `placed` says where it stands.
 void bind_arrays(nanobind::module_& module);

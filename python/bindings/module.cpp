@@ -8,6 +8,9 @@
 #include "data/files/error.h"
 #include "data/scene/scene.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/messages.h"
+#include "python/bindings/recording.h"
+#include "python/bindings/replay.h"
 #include "python/bindings/simulation.h"
 #include "sim/device_error.h"
 
@@ -17,17 +20,13 @@ namespace nb = nanobind;
 
 namespace {
 
-/// Bad input is a ValueError with the same line, in which a device is no option of a program.
+/// Bad input is a ValueError with the same line, in which options of programs are arguments.
 void raise_input_errors() {
   nb::register_exception_translator([](const std::exception_ptr& error, void*) {
     try {
       std::rethrow_exception(error);
     } catch (const data::InputError& bad) {
-      std::string line = bad.what();
-      const std::string option = "--device";
-      for (std::size_t at = line.find(option); at != std::string::npos; at = line.find(option, at))
-        line.replace(at, option.size(), "device");
-      PyErr_SetString(PyExc_ValueError, line.c_str());
+      PyErr_SetString(PyExc_ValueError, as_arguments(bad.what()).c_str());
     } catch (const sim::OutOfDeviceMemory& full) {
       PyErr_SetString(PyExc_MemoryError, full.what());
     }
@@ -56,4 +55,6 @@ NB_MODULE(_core, module) {
   flash::python::bind_scene(module);
   flash::python::bind_arrays(module);
   flash::python::bind_simulation(module);
+  flash::python::bind_recording(module);
+  flash::python::bind_replay(module);
 }

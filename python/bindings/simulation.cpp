@@ -23,7 +23,6 @@
 namespace flash::python {
 
 namespace nb = nanobind;
-using namespace std::chrono_literals;
 
 namespace {
 
@@ -118,22 +117,7 @@ void Simulation::step(int count) {
   use([&](sim::LiveScene& live) {
     // In a thread of its own, so that this one can see signals.
     std::future<void> steps = worker_.start([&] { live.step(count); });
-    const auto ended = [&](std::chrono::milliseconds time) {
-      const nb::gil_scoped_release release;
-      return steps.wait_for(time) == std::future_status::ready;
-    };
-    while (!ended(20ms)) {
-      if (PyErr_CheckSignals() == 0) continue;
-      const nb::python_error signal;
-      do live.stop();
-      while (!ended(1ms));
-      try {
-        steps.get();
-      } catch (const data::Stopped&) {
-      }
-      throw signal;
-    }
-    steps.get();
+    await(steps, [&] { live.stop(); });
   });
 }
 

@@ -1,11 +1,19 @@
 #include "python/bindings/worker.h"
 
+#include <nanobind/nanobind.h>
+
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "data/files/error.h"
+
 namespace flash::python {
+
+namespace nb = nanobind;
+using namespace std::chrono_literals;
 
 struct Worker::Thread {
   std::mutex mutex;  ///< of what is next
@@ -46,6 +54,25 @@ std::future<void> Worker::start(std::function<void()> work) {
   }
   thread_->changed.notify_one();
   return end;
+}
+
+void await(std::future<void>& work, const std::function<void()>& stop) {
+  const auto ended = [&](std::chrono::milliseconds time) {
+    const nb::gil_scoped_release release;
+    return work.wait_for(time) == std::future_status::ready;
+  };
+  while (!ended(20ms)) {
+    if (PyErr_CheckSignals() == 0) continue;
+    const nb::python_error signal;
+    do stop();
+    while (!ended(1ms));
+    try {
+      work.get();
+    } catch (const data::Stopped&) {
+    }
+    throw signal;
+  }
+  work.get();
 }
 
 }  // namespace flash::python

@@ -23,4 +23,8 @@ class Worker {
   pid_t process_ = 0;  ///< which has the thread; a fork does not
 };
 
+/// Waits for work without the lock of the interpreter. What the handler of a signal raises, as
+/// KeyboardInterrupt, ends it: `stop` is called until the work has ended, which may throw data::Stopped then.
+void await(std::future<void>& work, const std::function<void()>& stop);
+
 }  // namespace flash::python

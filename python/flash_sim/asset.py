@@ -44,6 +44,11 @@ class Asset:
         return {name: tuple(interval) for name, interval in (self._found.get("interval95") or {}).items() if interval}
 
     @property
+    def verdicts(self) -> dict[str, str]:
+        """Whether the recordings told each parameter that was searched: "yes", "no", "lower_bound" or "upper_bound"."""
+        return dict(self._found.get("identifiable") or {})
+
+    @property
     def caveats(self) -> list[str]:
         """What to know of the intervals, a line each."""
         return list(self._found.get("caveats") or [])

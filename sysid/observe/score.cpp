@@ -5,6 +5,8 @@
 #include <limits>
 #include <nanoflann.hpp>
 
+#include "sysid/observe/keyframe_distances.h"
+
 namespace flash::sysid {
 
 Eigen::Isometry3d Registration::observed_from_simulated() const {
@@ -46,41 +48,14 @@ double keyframe_score(const Motion& motion, const Observation& observation, cons
                       const Objective& objective, const data::CropBox& crop, SheetDistance& sheet,
                       const std::span<const sim::SurfaceFoot>* feet) {
   const std::array<double, 5> weights = term_weights(observation, objective);
-  const double t = observation.t + registration.time_offset;
-  data::Points positions;
-  surface_at(motion, t, positions);
-  if (feet != nullptr)
-    sheet.move_border(positions);
-  else
-    sheet.move(positions);
-  const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
-  const auto mean_distance = [&](const data::Points& points, const auto& match) {
-    std::vector<double> distances(static_cast<std::size_t>(points.rows()));
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-      const Eigen::Vector3d point = simulated_from_observed * points.row(i).transpose();
-      distances[static_cast<std::size_t>(i)] = match(i, point).distance;
-    }
-    return robust_mean(distances, objective.robust);
-  };
-  int hint = -1;
-  const auto on_surface = [&](Eigen::Index i, const Eigen::Vector3d& point) {
-    if (feet != nullptr) return SurfacePoint{.distance = (*feet)[static_cast<std::size_t>(i)].distance};
-    const SurfacePoint nearest = sheet.nearest(point, hint);
-    hint = nearest.triangle;
-    return nearest;
-  };
+  KeyframeDistances distances = keyframe_distances(motion, observation, registration, sheet, feet);
   double score = 0;
-  if (weights[0] > 0) score += weights[0] * mean_distance(observation.points, on_surface);
-  if (weights[1] > 0)
-    score += weights[1] * mean_distance(observation.contour, [&](Eigen::Index, const Eigen::Vector3d& point) {
-               return sheet.nearest_on_border(point);
-             });
-  if (weights[2] > 0)
+  if (weights[0] > 0) score += weights[0] * robust_mean(distances.cloud, objective.robust);
+  if (weights[1] > 0) score += weights[1] * robust_mean(distances.contour, objective.robust);
+  if (weights[2] > 0) score += weights[2] * robust_mean(distances.markers, objective.robust);
+  if (weights[3] > 0)
     score +=
-        weights[2] * mean_distance(observation.markers, [&](Eigen::Index i, const Eigen::Vector3d& point) {
-          return sheet.mark(observation.marks[static_cast<std::size_t>(i)], point);
-        });
-  if (weights[3] > 0) score += weights[3] * (force_at(motion, t) - *observation.force).norm();
+        weights[3] * (force_at(motion, observation.t + registration.time_offset) - *observation.force).norm();
   if (weights[4] > 0)
     score += weights[4] * keyframe_coverage(motion, observation, registration, objective.robust, crop);
   return score;

@@ -24,6 +24,7 @@ def tuned(tmp_path):
     asset = copy.deepcopy(TOWEL)
     asset["identification"] = {
         "interval95": {"young": [7e4, 1.4e5], "bending": [2e-5, 4.5e-5], "friction": None},
+        "identifiable": {"young": "yes", "bending": "yes", "friction": "no"},
         "samples": {"parameters": PARAMETERS, "values": samples().tolist()}, "caveats": ["one recording"],
         "units": {"young": "Pa", "thickness": "m", "bending_rigidity": "N m", "friction": "1"}}
     path = tmp_path / "tuned.json"
@@ -35,6 +36,7 @@ def test_it_says_what_was_found(tuned):
     asset = flash_sim.Asset(tuned)
     assert asset.values["young"] == 1e5 and asset.units["young"] == "Pa" and asset.units["friction"] == "1"
     assert asset.intervals == {"young": (7e4, 1.4e5), "bending": (2e-5, 4.5e-5)}
+    assert asset.verdicts == {"young": "yes", "bending": "yes", "friction": "no"}
     assert asset.is_identified and asset.caveats == ["one recording"]
 
 
