@@ -1,5 +1,6 @@
 """The page in the browser: what all views have in common."""
 import importlib.util
+import logging
 import pathlib
 import time
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ def open_page(title, port):
     import rich  # of viser, which writes boxes with it
     import viser
     rich.reconfigure(quiet=True)
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # of connections that browsers open and drop
     server = viser.ViserServer(host=HOST, port=port, label=pathlib.Path(title).name, verbose=False)
     server.request_share_url = lambda verbose=True: None  # the page may not ask for a tunnel to elsewhere
     server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
@@ -81,7 +83,7 @@ def furnish(server, box, ground=True, around=()):
     seen = box_about([np.stack([box.low, box.high, *around])])
     server.initial_camera.fov = 0.7
     server.initial_camera.look_at = seen.middle
-    server.initial_camera.position = seen.middle + 1.35 * seen.size * VIEW_FROM / np.linalg.norm(VIEW_FROM)
+    server.initial_camera.position = seen.middle + 1.5 * seen.size * VIEW_FROM / np.linalg.norm(VIEW_FROM)
     server.initial_camera.near = 0.02 * box.size
 
 

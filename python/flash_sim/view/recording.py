@@ -117,7 +117,7 @@ def show(server, recording):
         way = track[:, 1:4]
         if len(way) > 1:
             server.scene.add_line_segments(f"/way/{name}", np.stack([way[:-1], way[1:]], axis=1).astype(np.float32), (120, 120, 120),
-                                           line_width=2.0)
+                                           thickness=2.0, thickness_units="screen")
         frame = server.scene.add_frame(f"/gripper/{name}", axes_length=0.1 * box.size, axes_radius=0.004 * box.size)
         server.scene.add_label(f"/gripper/{name}/name", name)
         grippers[name] = (frame, Arrow(server, f"/force/{name}", box.size))

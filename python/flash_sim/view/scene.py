@@ -9,8 +9,8 @@ from flash_sim.view import page
 from flash_sim.view.drawn import BODIES, HELD, RIGID, Arrow, Points, Surface, table
 
 ENDLESS = 50.0  # [m]: what is larger is a plane or a cylinder without ends
-DRAWN_HALF = 1.0  # of a plane, over the size of the bodies
-SUNK = 2e-3  # by which a plane is drawn lower, over the size of the bodies, so that what lies on it shows
+DRAWN_HALF = 1.0  # diagonal of a plane's square, over the size of what lies about it
+SUNK = 2e-3  # by which a plane is drawn lower, likewise, so that what lies on it shows
 WEIGHT_ARROW = 0.25  # length of the arrow of the weight of all bodies, over their size
 EARTH = 9.81  # [m/s^2]
 
@@ -27,9 +27,9 @@ def start(path, envs=1, randomize="none", seed=0, device="auto"):
 
 
 def drawn_surface(sim, instance, env, box):
-    """(vertices, triangles) of an instance; a plane as a square about the bodies, which lie in `box`."""
+    """(vertices, triangles) of an instance; a plane as a square about what lies in `box`."""
     vertices, triangles = sim.surface(instance, env)
-    if len(vertices) == 4 and np.ptp(vertices, axis=0).max() > ENDLESS:
+    if len(vertices) == 4 and _is_endless(vertices):
         normal = np.cross(vertices[1] - vertices[0], vertices[2] - vertices[0])
         normal /= np.linalg.norm(normal)
         corners = vertices - vertices[0]
@@ -39,8 +39,18 @@ def drawn_surface(sim, instance, env, box):
     return vertices, triangles
 
 
+def box_of(sim):
+    """The Box about all that has ends."""
+    surfaces = [sim.surface(instance)[0] for instance in sim.instances]
+    return page.box_about([vertices for vertices in surfaces if not _is_endless(vertices)])
+
+
+def _is_endless(vertices):
+    return np.ptp(vertices, axis=0).max() > ENDLESS
+
+
 def weight_of(sim, env=0):
-    """Of all bodies at the start, by their surfaces, under the earth's gravity [N]."""
+    """Of all bodies by their surfaces, under the earth's gravity [N]; 1 where their assets weigh vertices."""
     weight = 0.0
     for body in sim.bodies:
         vertices, triangles = sim.surface(body, env)
@@ -50,7 +60,7 @@ def weight_of(sim, env=0):
             weight += EARTH * material["areal_density"] * 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
         else:
             weight += EARTH * material["density"] * abs(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
-    return weight
+    return weight or 1.0
 
 
 def forces_of(sim, env):
@@ -59,19 +69,19 @@ def forces_of(sim, env):
 
 
 def words_of(sim, env, forces, weight, arrow):
-    """Markdown: the state of an environment, and the forces on its bodies. arrow: how long that of their weight is [m]."""
+    """Markdown: the state of an environment, and the forces on its bodies. arrow: how long that of `weight` is [m]."""
     status = to_host(sim.status())[env] if sim.device == "cpu" else sim.status().numpy()[env]
     lost = sim.why_lost()[env]
     solved = f"lost: {lost}" if lost else "solved" if status["converged"] else f"not solved, residual {status['residual']:.1e}"
     rows = [(name, *(f"{value:.3f}" for value in force)) for name, force in forces.items()]
     return (f"**Time:** {status['time']:.3f} s, step {status['steps']:.0f}\n\n**Step:** {solved}, deepest "
             f"{1e3 * status['penetration']:.2f} mm below a surface\n\n**Forces on the bodies [N]**\n\n"
-            + table(("of", "x", "y", "z"), rows) + f"\n\nAll bodies weigh {weight:.3f} N, which is an arrow of {1e3 * arrow:.0f} mm. Green: what is held.")
+            + table(("of", "x", "y", "z"), rows) + f"\n\nAn arrow of {1e3 * arrow:.0f} mm is {weight:.3g} N. Green: what is held.")
 
 
 def show(server, sim):
     """Puts a scene on the page; what is to be called again and again, which takes the steps."""
-    box = page.box_about([sim.surface(body)[0] for body in sim.bodies])
+    box = box_of(sim)
     fixed = [instance for instance in sim.instances if instance not in sim.bodies]
     page.furnish(server, box, ground=False)
     weight, arrow = weight_of(sim), WEIGHT_ARROW * box.size
