@@ -33,8 +33,8 @@ class Viewer:
         self.address, self.port = found[0], int(found[1])
 
     def end(self):
-        """Exit code and stderr after Ctrl-C."""
-        self.process.send_signal(signal.SIGINT)
+        """Exit code and stderr after SIGTERM, which ends it as Ctrl-C does."""
+        self.process.send_signal(signal.SIGTERM)
         _, err = self.process.communicate(timeout=60)
         return self.process.returncode, err
 

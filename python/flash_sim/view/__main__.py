@@ -1,5 +1,6 @@
 """python -m flash_sim.view run|scene|recording ...: a page in the browser that shows it."""
 import argparse
+import pathlib
 import signal
 import sys
 
@@ -58,18 +59,18 @@ def whole(low, high):
 
 
 def load(settings):
-    """What is to be shown, as a function of the server, and its title."""
+    """What is to be shown, as a function of the server, and its paths."""
     if settings.verb == "run":
         from flash_sim.view import run
         runs = run.load_runs(settings.folders)
-        return lambda server: run.show(server, runs), " ".join(settings.folders)
+        return lambda server: run.show(server, runs), settings.folders
     if settings.verb == "recording":
         from flash_sim.view import recording
         loaded = recording.load_recording(settings.folder, settings.camera)
-        return lambda server: recording.show(server, loaded), settings.folder
+        return lambda server: recording.show(server, loaded), [settings.folder]
     from flash_sim.view import scene
     sim = scene.start(settings.file, settings.envs, settings.randomize, settings.seed, settings.device)
-    return lambda server: scene.show(server, sim), settings.file
+    return lambda server: scene.show(server, sim), [settings.file]
 
 
 def main(arguments=None):
@@ -77,16 +78,16 @@ def main(arguments=None):
     settings = parser().parse_args(arguments)
     try:
         page.expect_viser()
-        show, title = load(settings)
+        show, paths = load(settings)
     except (RecordingError, ValueError) as error:
         print(f"{NAME}: {one_line(str(error))}", file=sys.stderr)
         return BAD_INPUT
     except OSError as error:
         print(one_line(f"{NAME}: {error.filename}: {error.strerror}"), file=sys.stderr)
         return FAILED
-    server = page.open_page(title, settings.port)
+    server = page.open_page(", ".join(pathlib.Path(path).name for path in paths), settings.port)
     try:
-        page.serve(server, title, show(server))
+        page.serve(server, ", ".join(paths), show(server))
     except KeyboardInterrupt:
         return DONE
 

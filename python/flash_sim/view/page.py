@@ -1,7 +1,6 @@
 """The page in the browser: what all views have in common."""
 import importlib.util
 import logging
-import pathlib
 import time
 from dataclasses import dataclass
 
@@ -28,7 +27,7 @@ def open_page(title, port):
     import viser
     rich.reconfigure(quiet=True)
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # of connections that browsers open and drop
-    server = viser.ViserServer(host=HOST, port=port, label=pathlib.Path(title).name, verbose=False)
+    server = viser.ViserServer(host=HOST, port=port, label=title, verbose=False)
     server.request_share_url = lambda verbose=True: None  # the page may not ask for a tunnel to elsewhere
     server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
     server.scene.set_up_direction("+z")
