@@ -66,6 +66,7 @@ class LiveCameras {
 
   std::vector<std::string> names() const;
   std::vector<std::string> instances() const;
+  const std::vector<RigidBody>& bodies() const { return bodies_; }
 
   /// Throws data::InputError where there is none of that name.
   const LiveCamera& camera(const std::string& name) const;

@@ -17,10 +17,15 @@ void add_force(const std::vector<Eigen::Vector3d>& forces, int number, int e, st
 
 }  // namespace
 
-void LiveForces::add(std::string name, std::vector<EndEffectorNumbers> numbers, int environments) {
-  forces_.push_back(
-      {std::move(name), std::move(numbers), std::vector<double>(3 * static_cast<std::size_t>(environments))});
+void LiveForces::add(const std::string& name, std::vector<EndEffectorNumbers> numbers, int environments) {
+  auto force = std::find_if(forces_.begin(), forces_.end(), [&](const Force& f) { return f.name == name; });
+  if (force == forces_.end())
+    force = forces_.insert(force,
+                           Force{name, {}, std::vector<double>(3 * static_cast<std::size_t>(environments))});
+  force->parts.push_back(std::move(numbers));
 }
+
+std::vector<std::string> LiveForces::names() const { return names_of(forces_); }
 
 void LiveForces::renew(const std::vector<Worlds>& worlds) {
   for (Force& force : forces_) {
@@ -28,14 +33,30 @@ void LiveForces::renew(const std::vector<Worlds>& worlds) {
     for (std::size_t w = 0; w < worlds.size(); ++w)
       for (int e = 0; e < worlds[w].size(); ++e) {
         const StepReport& report = worlds[w].report(e);
-        add_force(report.hold_forces, force.numbers[w].hold, e, force.sum);
-        add_force(report.obstacle_forces, force.numbers[w].obstacle, e, force.sum);
+        for (const std::vector<EndEffectorNumbers>& numbers : force.parts) {
+          add_force(report.hold_forces, numbers[w].hold, e, force.sum);
+          add_force(report.obstacle_forces, numbers[w].obstacle, e, force.sum);
+        }
       }
   }
 }
 
-const std::vector<double>& LiveForces::of(const std::string& name) const {
-  return forces_[number_of("end effector or obstacle", name, names_of(forces_))].sum;
+const LiveForces::Force& LiveForces::named(const std::string& name) const {
+  return forces_[number_of("end effector, obstacle or hold", name, names_of(forces_))];
+}
+
+const std::vector<double>& LiveForces::of(const std::string& name) const { return named(name).sum; }
+
+std::vector<int> LiveForces::held(const std::string& name, const Worlds& worlds, std::size_t w,
+                                  int environment) const {
+  const std::vector<HeldVertices>& held = worlds.given(environment).state.held;
+  std::vector<int> vertices;
+  for (const std::vector<EndEffectorNumbers>& numbers : named(name).parts)
+    if (const int hold = numbers[w].hold; hold >= 0 && hold < std::ssize(held)) {
+      const std::vector<int>& taken = held[static_cast<std::size_t>(hold)].vertices;
+      vertices.insert(vertices.end(), taken.begin(), taken.end());
+    }
+  return vertices;
 }
 
 }  // namespace flash::sim

@@ -11,21 +11,29 @@ namespace flash::sim {
 /// Forces of end effectors and obstacles on all objects of a live scene together. They stay where they are.
 class LiveForces {
  public:
-  /// Of what has these numbers in each of the worlds; a hold of -1 is none.
-  void add(std::string name, std::vector<EndEffectorNumbers> numbers, int environments);
+  /// Of what has these numbers in each of the worlds; a hold or an obstacle of -1 is none. What has the name
+  /// of one before acts with it.
+  void add(const std::string& name, std::vector<EndEffectorNumbers> numbers, int environments);
 
   /// Takes them from the last step of the worlds.
   void renew(const std::vector<Worlds>& worlds);
 
+  std::vector<std::string> names() const;  ///< in the order in which they were added
+
   /// environments x 3 [N].  Throws data::InputError.
   const std::vector<double>& of(const std::string& name) const;
+
+  /// Vertices of worlds number `w` that what has this name carries in an environment.
+  std::vector<int> held(const std::string& name, const Worlds& worlds, std::size_t w, int environment) const;
 
  private:
   struct Force {
     std::string name;
-    std::vector<EndEffectorNumbers> numbers;
+    std::vector<std::vector<EndEffectorNumbers>> parts;  ///< numbers in each of the worlds
     std::vector<double> sum;
   };
+  const Force& named(const std::string& name) const;
+
   std::deque<Force> forces_;
 };
 

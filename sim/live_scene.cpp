@@ -32,10 +32,18 @@ Tensor dense(const std::vector<double>& numbers, std::vector<std::int64_t> shape
   return {.data = numbers.data(), .shape = std::move(shape)};
 }
 
+/// Those of a body, by its own vertices.
+data::Triangles visible_triangles_of(const Body& body, const data::Triangles& all) {
+  std::vector<Eigen::Index> own;
+  for (Eigen::Index t = 0; t < all.rows(); ++t)
+    if (all(t, 0) >= body.first_vertex && all(t, 0) < body.first_vertex + body.vertex_count) own.push_back(t);
+  return all(own, Eigen::all).array() - body.first_vertex;
+}
+
 LiveObject object_of(const Sheet& sheet, std::size_t body, std::string name, std::size_t worlds) {
   const Body& part = sheet.bodies[body];
   return {.name = std::move(name),
-          .triangles = visible_triangles(body_alone(sheet, part)),
+          .triangles = visible_triangles_of(part, visible_triangles(sheet)),
           .is_solid = part.is_solid(),
           .worlds = worlds,
           .body = static_cast<int>(body),
@@ -82,14 +90,18 @@ struct LiveScene::Storage {
   LiveCameras cameras;
   std::unique_ptr<DeviceCopies> copies;  ///< on the device that steps; null: the processor
 
+  void check_environment(int e) const {
+    if (e < 0 || e >= environments)
+      throw InputError("environments: found " + std::to_string(e) + ", expected 0 to " +
+                       std::to_string(environments - 1));
+  }
+
   /// The environments that are meant, each once.
   std::span<const int> chosen_of(const Chosen& chosen) const {
     if (chosen.all()) return every;
     std::vector<bool> found(every.size());
     for (const int e : chosen.numbers()) {
-      if (e < 0 || e >= environments)
-        throw InputError("environments: found " + std::to_string(e) + ", expected 0 to " +
-                         std::to_string(environments - 1));
+      check_environment(e);
       if (found[static_cast<std::size_t>(e)])
         throw InputError("environments: found " + std::to_string(e) + " twice, expected each once");
       found[static_cast<std::size_t>(e)] = true;
@@ -207,6 +219,14 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, co
     s.forces.add(surfaces[static_cast<std::size_t>(k)],
                  std::vector(s.worlds.size(), EndEffectorNumbers{.frame = -1, .hold = -1, .obstacle = k}),
                  environments);
+  for (std::size_t w = 0; w < s.worlds.size(); ++w) {
+    const std::vector<Hold>& holds = s.worlds[w].given(0).holds;
+    for (int k = 0; k < std::ssize(holds); ++k) {
+      std::vector<EndEffectorNumbers> numbers(s.worlds.size(), {.frame = -1, .hold = -1, .obstacle = -1});
+      numbers[w].hold = k;
+      s.forces.add(holds[static_cast<std::size_t>(k)].name, std::move(numbers), environments);
+    }
+  }
   if (device.device == Device::cuda)
     s.copies = std::make_unique<DeviceCopies>(device.cuda_devices.empty() ? 0 : device.cuda_devices.front());
   s.show();
@@ -231,11 +251,12 @@ std::vector<std::string> LiveScene::obstacles() const {
 void LiveScene::add_end_effector(const EndEffector& effector, const Tensor& poses) {
   Storage& s = *storage_;
   std::vector<std::string> taken = s.effector_names();
-  taken.insert(taken.end(), s.scene_names.begin(), s.scene_names.end());
+  for (const std::vector<std::string>& names : {s.scene_names, s.forces.names()})
+    taken.insert(taken.end(), names.begin(), names.end());
   if (effector.name.empty()) throw InputError("name: found \"\", expected a name");
   if (std::find(taken.begin(), taken.end(), effector.name) != taken.end())
     throw InputError("name: found \"" + effector.name +
-                     "\", which an obstacle or another end effector has, expected a new one");
+                     "\", which an obstacle, a hold or another end effector has, expected a new one");
   LiveEffector live;
   live.effector = effector;
   for (Worlds& of_object : s.worlds) live.numbers.push_back(of_object.add(effector, poses));
@@ -416,6 +437,22 @@ Tensor LiveScene::force(const std::string& name) const {
   return dense(storage_->forces.of(name), {size(), 3});
 }
 
+std::vector<std::string> LiveScene::forces() const { return storage_->forces.names(); }
+
+data::Points LiveScene::held_places(const std::string& name, int environment) const {
+  const Storage& s = *storage_;
+  s.check_environment(environment);
+  data::Points places(0, 3);
+  for (std::size_t w = 0; w < s.worlds.size(); ++w) {
+    const std::vector<int> held = s.forces.held(name, s.worlds[w], w, environment);
+    const data::Points more = s.worlds[w].environment(environment).state.positions(held, Eigen::all);
+    data::Points all(places.rows() + more.rows(), 3);
+    all << places, more;
+    places = std::move(all);
+  }
+  return places;
+}
+
 Tensor LiveScene::pose(const std::string& end_effector) const {
   return dense(storage_->effector(end_effector).poses, {size(), 7});
 }
@@ -471,6 +508,23 @@ void LiveScene::load(const Chosen& environments, const Saved& saved) {
 }
 
 std::vector<std::string> LiveScene::instances() const { return storage_->cameras.instances(); }
+
+data::TriangleMesh LiveScene::surface(const std::string& instance, int environment) const {
+  const Storage& s = *storage_;
+  s.check_environment(environment);
+  const std::size_t number = number_of("instance", instance, instances());
+  if (number < s.objects.size()) {
+    const LiveObject& object = s.objects[number];
+    const data::Points& positions = s.worlds[object.worlds].environment(environment).state.positions;
+    return {positions.middleRows(object.first_vertex, object.vertices), object.triangles};
+  }
+  const RigidBody& body = s.cameras.bodies()[number - s.objects.size()];
+  const Environment& now = *s.latest(environment);
+  const Eigen::Isometry3d pose = frame_pose(now, body.frame, now.state.time);
+  data::TriangleMesh mesh = body.surface;
+  mesh.vertices = (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
+  return mesh;
+}
 
 std::vector<std::string> LiveScene::cameras() const { return storage_->cameras.names(); }
 

@@ -98,8 +98,11 @@ class LiveScene {
   // on the processor. What is in them is as it was at the end of the last step.
   Tensor positions(const std::string& object) const;   ///< environments x vertices x 3 [m]
   Tensor velocities(const std::string& object) const;  ///< environments x vertices x 3 [m/s]
-  /// Of an end effector or an obstacle on the objects: environments x 3 [N].
+  /// Of an end effector, an obstacle or a hold of the file on the objects, by name: environments x 3 [N].
   Tensor force(const std::string& name) const;
+  std::vector<std::string> forces() const;  ///< the names that `force` knows
+  /// Where the vertices are that something with such a name carries in an environment: a row each [m].
+  data::Points held_places(const std::string& name, int environment) const;
   Tensor pose(const std::string& end_effector) const;  ///< where it was told to be: environments x 7
   Tensor status() const;  ///< environments x 7, the fields of WorldStatus, the worst of the objects
 
@@ -112,6 +115,8 @@ class LiveScene {
   /// What pictures tell apart, by its number there: the objects, the obstacles, then end effectors that were
   /// added.
   std::vector<std::string> instances() const;
+  /// What pictures of an instance are drawn from: in the base frame, as an environment stands now.
+  data::TriangleMesh surface(const std::string& instance, int environment) const;
   std::vector<std::string> cameras() const;  ///< in their order
   const LiveCamera& camera(const std::string& name) const;
 

@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -31,12 +32,14 @@ nanobind::ndarray<nanobind::numpy, Number> array_of(std::vector<Number> numbers,
   return {kept->data(), shape.size(), shape.data(), owner};
 }
 
-/// The same of a matrix that is kept row by row.
+/// The same of a matrix, row by row.
 template <class Matrix>
-nanobind::ndarray<nanobind::numpy, typename Matrix::Scalar> array_of(const Matrix& rows) {
-  static_assert(Matrix::IsRowMajor);
-  return array_of(std::vector<typename Matrix::Scalar>(rows.data(), rows.data() + rows.size()),
-                  {static_cast<std::size_t>(rows.rows()), static_cast<std::size_t>(rows.cols())});
+auto array_of(const Matrix& matrix) {
+  std::vector<typename Matrix::Scalar> numbers;
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column) numbers.push_back(matrix(row, column));
+  return array_of(std::move(numbers),
+                  {static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols())});
 }
 
 /// What arrays on a device need: `to_host` copies one to numpy, `placed` says where it stands.

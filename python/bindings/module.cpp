@@ -8,6 +8,7 @@
 #include "data/files/error.h"
 #include "data/scene/scene.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/files.h"
 #include "python/bindings/messages.h"
 #include "python/bindings/recording.h"
 #include "python/bindings/replay.h"
@@ -54,6 +55,7 @@ NB_MODULE(_core, module) {
   flash::python::raise_input_errors();
   flash::python::bind_scene(module);
   flash::python::bind_arrays(module);
+  flash::python::bind_files(module);
   flash::python::bind_simulation(module);
   flash::python::bind_recording(module);
   flash::python::bind_replay(module);

@@ -56,15 +56,6 @@ sim::Tensor column_of(const sim::Tensor& rows, int column) {
   return tensor;
 }
 
-nb::ndarray<nb::numpy, int> triangles_of(const sim::LiveObject& object) {
-  auto* numbers = new std::vector<int>(static_cast<std::size_t>(object.triangles.size()));
-  const nb::capsule owner(numbers, [](void* kept) noexcept { delete static_cast<std::vector<int>*>(kept); });
-  for (Eigen::Index t = 0; t < object.triangles.rows(); ++t)
-    for (Eigen::Index k = 0; k < 3; ++k)
-      (*numbers)[static_cast<std::size_t>(3 * t + k)] = object.triangles(t, k);
-  return {numbers->data(), {static_cast<std::size_t>(object.triangles.rows()), 3}, owner};
-}
-
 }  // namespace
 
 void check_device(const std::string& device) { one_device(device); }
@@ -144,6 +135,17 @@ void bind_simulation(nb::module_& module) {
                  [](Simulation& s) { return s.use([](LiveScene& live) { return live.obstacles(); }); });
   simulation.def("end_effectors",
                  [](Simulation& s) { return s.use([](LiveScene& live) { return live.end_effectors(); }); });
+  simulation.def("forces",
+                 [](Simulation& s) { return s.use([](LiveScene& live) { return live.forces(); }); });
+  simulation.def("held_places", [](Simulation& s, const std::string& name, int environment) {
+    return s.use([&](LiveScene& live) { return array_of(live.held_places(name, environment)); });
+  });
+  simulation.def("surface", [](Simulation& s, const std::string& instance, int environment) {
+    return s.use([&](LiveScene& live) {
+      const data::TriangleMesh mesh = live.surface(instance, environment);
+      return nb::make_tuple(array_of(mesh.vertices), array_of(mesh.triangles));
+    });
+  });
   simulation.def("vertices", [](Simulation& s, const std::string& object) {
     return s.use([&](LiveScene& live) {
       const auto& all = live.objects();
@@ -154,7 +156,7 @@ void bind_simulation(nb::module_& module) {
     return s.use([](LiveScene& live) {
       nb::dict objects;
       for (const sim::LiveObject& object : live.objects())
-        objects[object.name.c_str()] = triangles_of(object);
+        objects[object.name.c_str()] = array_of(object.triangles);
       return objects;
     });
   });

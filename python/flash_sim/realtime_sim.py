@@ -140,12 +140,13 @@ class RealtimeSim:
         return self._view(lambda: simulation.velocities(body))
 
     def force(self, ee: str) -> np.ndarray | DeviceArray:
-        """Live (n_envs, 3) [N]: of an end effector on the bodies, by its hold and its surface, or of an obstacle by name.
+        """Live (n_envs, 3) [N]: of an end effector on the bodies, by its hold and its surface, or of an obstacle or a hold
+        of the scene, by one of the names of `forces`.
 
         A wrist feels the negative.
         """
         simulation = self._ready("force")
-        arguments.one_of("force: ee", ee, list(dict.fromkeys(simulation.end_effectors() + simulation.obstacles())))
+        arguments.one_of("force: ee", ee, simulation.forces())
         return self._view(lambda: simulation.force(ee, True), lambda: np.array(simulation.force(ee, False)))
 
     def pose(self, ee: str) -> np.ndarray:
@@ -157,6 +158,12 @@ class RealtimeSim:
         """(n_envs,) int: how many vertices an end effector carries."""
         simulation = self._ready("held")
         return np.array(simulation.held(self._effector("held: ee", ee)), int)
+
+    def held_places(self, name: str, env_id: int = 0) -> np.ndarray:
+        """(k, 3) [m]: where the vertices are that an end effector or a hold of the scene carries. A copy."""
+        simulation = self._ready("held_places")
+        arguments.one_of("held_places: name", name, simulation.forces())
+        return simulation.held_places(name, arguments.whole_number("held_places: env_id", env_id, 0, self._initialized_envs - 1))
 
     def status(self) -> np.ndarray | DeviceStatus:
         """Live (n_envs,) of named numbers: steps, time [s], converged, residual, penetration [m], parts, lost.
@@ -377,6 +384,11 @@ class RealtimeSim:
         return self._ready("obstacles").obstacles()
 
     @property
+    def forces(self) -> list[str]:
+        """Names that force() knows: obstacles, holds of the scene, end effectors that were added."""
+        return self._ready("forces").forces()
+
+    @property
     def cameras(self) -> list[str]:
         """Names of those that were added."""
         return self._ready("cameras").cameras()
@@ -395,6 +407,13 @@ class RealtimeSim:
         """(triangles, 3) int: the visible triangles by the body's vertices."""
         self._ready("triangles")
         return self._triangles[self._body("triangles: body", body)]
+
+    def surface(self, instance: str, env_id: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """What pictures of an instance are drawn from, as it stands now: vertices (V, 3) in the base frame [m], and triangles
+        (T, 3) int by them. Copies. A plane is a square that reaches beyond 100 m; round obstacles have 48 flat sides."""
+        simulation = self._ready("surface")
+        arguments.one_of("surface: instance", instance, simulation.instances())
+        return simulation.surface(instance, arguments.whole_number("surface: env_id", env_id, 0, self._initialized_envs - 1))
 
     def asset(self, body: str | None = None) -> Asset:
         """The Asset that a body was made of."""
