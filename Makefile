@@ -26,7 +26,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study link-length-study use-study watch-study held-out arm-errors
+.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study lens-study link-length-study use-study watch-study held-out arm-errors pairs-coverage
 .PHONY: cells grasp-convergence grasp-shapes few-views-study knock-study motion-study moving-arm-study ridge-study same-answers locking drape clamped-strip self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads python-test python-rate configure-test format check-format check-includes tidy
 .PHONY: tours examples constants container container-test pictures site release studies kinhec device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check packages-site
@@ -166,6 +166,10 @@ moving-arm-study: configure-test  ## Say whether hand-eye calibration finds the 
 watch-study: configure-test  ## Say how many views following the next pose of flash-calib watch takes, beside views at random, over ten simulated cells of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target watch_study
 	$(BUILD)/tests/watch_study
+
+pairs-coverage: configure-test  ## Say how often stated regions of pairs of poses hold the truth: drawn arms, RUNS of each kind from SEED on
+	cmake --build $(BUILD) -j $(JOBS) --target flash-calib
+	$(PYTHON) tests/validation/pairs_coverage.py --calib $(BUILD)/bin/flash-calib --runs $(RUNS) --seed $(SEED)
 
 arm-errors:  ## Say over which reach and of which size errors of drawn arms are, as hand-eye calibration expects them
 	$(PYTHON) tests/validation/arm_errors.py

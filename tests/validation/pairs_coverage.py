@@ -1,0 +1,113 @@
+#!/usr/bin/env python3
+"""How often flash-calib's 95 % region of pairs of poses holds the truth: arms of three makes whose zeros, links, axes and gears are off, seen by a
+camera that scatters. Arms, poses and pairs are drawn by this file and arm_errors.py alone. Prints a table: pairs far apart and near each
+other, few, in clusters, and of an arm that has noise alone."""
+import argparse
+import json
+import math
+import pathlib
+import subprocess
+import tempfile
+
+import numpy
+
+from arm_errors import ARMS, ERRORS, gripper, turned
+
+CHI_SQUARE_95 = 12.592  # six degrees of freedom
+# Of the camera: turns [rad], across its line of sight and along it [m]. Of the robot: what it does not repeat [rad, m].
+CAMERA, REPEATABILITY, NOISE = (math.radians(0.1), 2e-4, 8e-4), (5e-5, 2e-5), (math.radians(0.05), 5e-4)
+# Pairs, how far joints move either way [rad], clusters of 0.06 rad (0: none), and whether the arm's model is off.
+KINDS = {"14 pairs": (14, 0.6, 0, True), "30 pairs": (30, 0.6, 0, True), "4 pairs": (4, 0.6, 0, True), "6 pairs": (6, 0.6, 0, True),
+         "near each other": (14, 0.2, 0, True), "three clusters": (14, 0.4, 3, True), "noise alone": (14, 0.6, 0, False)}
+
+
+def pose(R, t):
+    T = numpy.eye(4)
+    T[:3, :3], T[:3, 3] = R, t
+    return T
+
+
+def scattered(random, turn, shift):
+    return pose(turned(turn * random.standard_normal(3)), shift * random.standard_normal(3))
+
+
+def drawn(random, setup, kind):
+    """Poses of the gripper and of the target, as they are reported, and X."""
+    count, spread, clusters, wrong = KINDS[kind]
+    joints, tool, home = ARMS[list(ARMS)[random.integers(len(ARMS))]]
+    n = len(joints)
+    zero, length, axis, gear = ERRORS[random.integers(len(ERRORS))] if wrong else (0, 0, 0, 0)
+    zeros, harmonics = numpy.radians(random.normal(0, zero, n)), numpy.radians(random.normal(0, gear, n))
+    phases, origins, axes = random.uniform(0, 2 * math.pi, n), random.normal(0, 1e-3 * length, (n + 1, 3)), numpy.radians(random.normal(0, axis, (n, 3)))
+    right = numpy.zeros((n + 1, 3)), numpy.zeros((n, 3))
+    middle = numpy.array(home) + random.uniform(-0.4, 0.4, n)
+    centres = middle + random.uniform(-spread, spread, (max(clusters, 1), n)) if clusters else [middle]
+    at = pose(*gripper(joints, tool, middle, *right))
+    # What is mounted on the gripper, and what stands before it.
+    held = pose(turned(0.3 * random.standard_normal(3)), 0.06 * random.standard_normal(3))
+    before = pose(turned((0, 0, random.uniform(-3, 3))) @ turned(0.2 * random.standard_normal(3)),
+                  (0, 0, random.uniform(0.35, 0.7) if setup == "eye-in-hand" else random.uniform(0.6, 1.3)))
+    in_hand = setup == "eye-in-hand"
+    X = held if in_hand else at @ held @ numpy.linalg.inv(before)
+    Z = at @ held @ before if in_hand else held
+    robot, target = [], []
+    while len(robot) < count:
+        q = centres[random.integers(len(centres))] + (0.06 * random.standard_normal(n) if clusters else random.uniform(-spread, spread, n))
+        told = pose(*gripper(joints, tool, q, *right))
+        true = pose(*gripper(joints, tool, q + zeros + harmonics * numpy.sin(q + phases), origins, axes)) @ scattered(random, *REPEATABILITY)
+        seen = numpy.linalg.inv(true @ X) @ Z if in_hand else numpy.linalg.inv(X) @ true @ Z
+        place = seen[:3, 3]
+        if not (place[2] > 0.15 and math.hypot(*place[:2]) < 0.55 * place[2] and abs(seen[2, 2]) > math.cos(1)):
+            continue
+        sight, noise = place / numpy.linalg.norm(place), random.standard_normal(3)
+        along = sight * (noise @ sight)
+        robot.append(told if wrong else told @ scattered(random, *NOISE))
+        target.append(pose(seen[:3, :3] @ turned(CAMERA[0] * random.standard_normal(3)), place + CAMERA[1] * (noise - along) + CAMERA[2] * along))
+    return numpy.array(robot), numpy.array(target), X
+
+
+def answer(calib, folder, setup, robot, target):
+    """Transform and covariance; None where the program refuses."""
+    numpy.savez(folder / "pairs.npz", robot=robot, target=target)
+    done = subprocess.run([calib, "handeye", folder / "pairs.npz", "--setup", setup, "--force", "--quiet", "-o", folder / "pairs.json"],
+                          capture_output=True, text=True)
+    if done.returncode not in (0, 3):
+        return None
+    result = json.loads((folder / "pairs.json").read_text())
+    x, y, z, w = result["transform"]["rotation_xyzw"]
+    R = numpy.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    return pose(R, result["transform"]["translation"]), numpy.array(result["covariance"]), done.returncode
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--calib", required=True)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--runs", type=int, default=100, help="of each row")
+    options = parser.parse_args()
+    print("| setup | poses | answered | of them exit code 3 | inside of 95 % | off by, rms mm | stated, rms mm |")
+    print("|" + "---|" * 7)
+    with tempfile.TemporaryDirectory() as folder:
+        for setup in ("eye-in-hand", "eye-to-hand"):
+            for kind in KINDS:
+                inside, threes, off, stated = 0, 0, [], []
+                for run in range(options.runs):
+                    robot, target, X = drawn(numpy.random.default_rng((options.seed, run)), setup, kind)
+                    found = answer(options.calib, pathlib.Path(folder), setup, robot, target)
+                    if found is None:
+                        continue
+                    T, covariance, code = found
+                    D = numpy.linalg.inv(T) @ X
+                    error = numpy.concatenate([D[:3, 3], 0.5 * numpy.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])])
+                    inside += error @ numpy.linalg.solve(covariance, error) < CHI_SQUARE_95
+                    threes += code == 3
+                    off.append(error[:3] @ error[:3])
+                    stated.append(covariance[:3, :3].trace())
+                rms = [1e3 * math.sqrt(numpy.mean(values)) for values in (off, stated)]
+                print(f"| {setup} | {kind} | {len(off)} of {options.runs} | {threes} | {100 * inside / len(off):.0f} % | {rms[0]:.2f} | {rms[1]:.2f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
