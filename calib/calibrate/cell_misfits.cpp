@@ -54,9 +54,9 @@ std::vector<std::string> images_of(const std::vector<CellMember>& members, std::
 }  // namespace
 
 bool same_pose(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  constexpr double kSame = 1e-4;  // [m], [rad]
+  constexpr double kShift = 1e-4, kTurn = 3e-4;  // [m], [rad]: as four digits, or 0.01 deg, are rounded
   const Vector6d apart = motion_between(a, b);
-  return apart.head<3>().norm() < kSame && apart.tail<3>().norm() < kSame;
+  return apart.head<3>().norm() < kShift && apart.tail<3>().norm() < kTurn;
 }
 
 std::vector<std::string> misfit_sentences(const std::vector<CellMember>& members) {

@@ -115,6 +115,26 @@ class EndKnocks {
   double distance_ = 0;
 };
 
+struct Hypothesis {
+  Side side;
+  double evidence = 0;  ///< odds against no knock
+  double deviance = std::numeric_limits<double>::infinity();
+};
+
+/// Odds say at which end and of what; how many views stand moved is what all views say, as odds of few of
+/// them and of more are against nulls of their own.
+Side likeliest_of(const std::vector<Hypothesis>& all) {
+  const Side kind = std::max_element(all.begin(), all.end(), [](const Hypothesis& a, const Hypothesis& b) {
+                      return a.evidence < b.evidence;
+                    })->side;
+  const Hypothesis* best = nullptr;
+  for (const Hypothesis& one : all)
+    if (one.side.last == kind.last && one.side.camera == kind.camera &&
+        (best == nullptr || one.deviance < best->deviance))
+      best = &one;
+  return best->side;
+}
+
 /// The weight of a shift's square that a normal distribution needs for its regions up to that of 99.9 % to
 /// hold what the shift has moved, where it took place with that probability: beyond its share of the
 /// variance, a region that holds all but so much reaches it.
@@ -149,29 +169,28 @@ EndKnock find_end_knock(const TimedPoses& poses, const BundleSettings& settings)
   if (poses.time.empty() || !MotionInTime::applies(poses.refined.bundle, settings)) return result;
   const EndKnocks knocks(poses, settings);
   const double places = 2.0 * (knocks.views() - 1);
-  double odds = 0, best = 0, best_of_kind[2] = {0, 0};
+  double odds = 0, best_of_kind[2] = {0, 0};
   double of_kind[2][2] = {{0, 0}, {0, 0}};  // odds of the last or the first views, of camera or target
-  Side likeliest;
-  std::vector<std::pair<Side, double>> all;
+  std::vector<Hypothesis> all;
   for (const bool last : {true, false})
     for (int count = kFewest; count <= kEndViews && knocks.views() - count >= kRemaining; ++count) {
       const double still = std::min(knocks.still({last, count, true}), knocks.still({last, count, false}));
       for (const bool camera : {true, false}) {
         const Side side{last, count, camera};
-        double evidence = 0;
-        for (const double size : kSizes)
-          evidence += std::exp(std::min(300.0, 0.5 * (still - knocks.moved(side, size)))) /
-                      (static_cast<double>(kSizes.size()) * kOdds * places);
-        odds += evidence;
-        of_kind[last][camera] += evidence;
-        all.emplace_back(side, evidence);
-        best_of_kind[camera] = std::max(best_of_kind[camera], evidence);
-        if (evidence <= best) continue;
-        best = evidence;
-        likeliest = side;
+        Hypothesis& knock = all.emplace_back(Hypothesis{side});
+        for (const double size : kSizes) {
+          const double deviance = knocks.moved(side, size);
+          knock.evidence += std::exp(std::min(300.0, 0.5 * (still - deviance))) /
+                            (static_cast<double>(kSizes.size()) * kOdds * places);
+          knock.deviance = std::min(knock.deviance, deviance);
+        }
+        odds += knock.evidence;
+        of_kind[last][camera] += knock.evidence;
+        best_of_kind[camera] = std::max(best_of_kind[camera], knock.evidence);
       }
     }
   if (all.empty()) return result;
+  const Side likeliest = likeliest_of(all);
   result.probability = odds / (1 + odds);
   result.last = likeliest.last;
   if (odds > 1) {
@@ -180,11 +199,11 @@ EndKnock find_end_knock(const TimedPoses& poses, const BundleSettings& settings)
         static_cast<std::size_t>(likeliest.last ? knocks.views() - likeliest.count : likeliest.count);
     knock.camera = likeliest.camera;
     knock.motion = (likeliest.last ? 1 : -1) * knocks.motion(likeliest);
-    knock.told = best > kOdds * best_of_kind[!likeliest.camera];
+    knock.told = best_of_kind[likeliest.camera] > kOdds * best_of_kind[!likeliest.camera];
     knock.gain = knock.second = 2 * std::log(odds);
     return result;
   }
-  for (const auto& [side, evidence] : all) {
+  for (const auto& [side, evidence, deviance] : all) {
     const double kind = of_kind[side.last][side.camera];
     const double weight = kind > 0 ? weight_of(kind / (1 + odds)) * evidence / kind : 0;
     if (weight > kLittle)
