@@ -25,6 +25,13 @@ std::vector<Isometry3d> poses_now(std::span<const Environment* const> environmen
 
 }  // namespace
 
+data::TriangleMesh surface_now(const RigidBody& body, const Environment& environment) {
+  const Isometry3d pose = frame_pose(environment, body.frame, environment.state.time);
+  data::TriangleMesh mesh = body.surface;
+  mesh.vertices = (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
+  return mesh;
+}
+
 std::vector<RigidBody> rigid_bodies(const data::Scene& scene, const Environment& environment) {
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(drawn_reach);
   Eigen::AlignedBox3d about;

@@ -22,6 +22,9 @@ struct RigidBody {
   bool collides = true;
 };
 
+/// Where it is in an environment, in the base frame.
+data::TriangleMesh surface_now(const RigidBody& body, const Environment& environment);
+
 /// How far from where a scene starts planes and cylinders without ends are drawn [m].
 inline constexpr double drawn_reach = 100;
 

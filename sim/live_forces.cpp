@@ -17,6 +17,24 @@ void add_force(const std::vector<Eigen::Vector3d>& forces, int number, int e, st
 
 }  // namespace
 
+LiveForces::LiveForces(const std::vector<Worlds>& worlds, const std::vector<std::string>& obstacles) {
+  constexpr EndEffectorNumbers none{.frame = -1, .hold = -1, .obstacle = -1};
+  const int environments = worlds.front().size();
+  for (int k = 0; k < std::ssize(obstacles); ++k) {
+    std::vector<EndEffectorNumbers> numbers(worlds.size(), none);
+    for (EndEffectorNumbers& each : numbers) each.obstacle = k;
+    add(obstacles[static_cast<std::size_t>(k)], std::move(numbers), environments);
+  }
+  for (std::size_t w = 0; w < worlds.size(); ++w) {
+    const std::vector<Hold>& holds = worlds[w].given(0).holds;
+    for (int k = 0; k < std::ssize(holds); ++k) {
+      std::vector<EndEffectorNumbers> numbers(worlds.size(), none);
+      numbers[w].hold = k;
+      add(holds[static_cast<std::size_t>(k)].name, std::move(numbers), environments);
+    }
+  }
+}
+
 void LiveForces::add(const std::string& name, std::vector<EndEffectorNumbers> numbers, int environments) {
   auto force = std::find_if(forces_.begin(), forces_.end(), [&](const Force& f) { return f.name == name; });
   if (force == forces_.end())
@@ -47,16 +65,23 @@ const LiveForces::Force& LiveForces::named(const std::string& name) const {
 
 const std::vector<double>& LiveForces::of(const std::string& name) const { return named(name).sum; }
 
-std::vector<int> LiveForces::held(const std::string& name, const Worlds& worlds, std::size_t w,
-                                  int environment) const {
-  const std::vector<HeldVertices>& held = worlds.given(environment).state.held;
-  std::vector<int> vertices;
-  for (const std::vector<EndEffectorNumbers>& numbers : named(name).parts)
-    if (const int hold = numbers[w].hold; hold >= 0 && hold < std::ssize(held)) {
+data::Points LiveForces::held_places(const std::string& name, const std::vector<Worlds>& worlds,
+                                     int environment) const {
+  const Force& force = named(name);
+  data::Points places(0, 3);
+  for (std::size_t w = 0; w < worlds.size(); ++w) {
+    const std::vector<HeldVertices>& held = worlds[w].given(environment).state.held;
+    const data::Points& positions = worlds[w].environment(environment).state.positions;
+    for (const std::vector<EndEffectorNumbers>& numbers : force.parts) {
+      const int hold = numbers[w].hold;
+      if (hold < 0 || hold >= std::ssize(held)) continue;
       const std::vector<int>& taken = held[static_cast<std::size_t>(hold)].vertices;
-      vertices.insert(vertices.end(), taken.begin(), taken.end());
+      const Eigen::Index before = places.rows();
+      places.conservativeResize(before + std::ssize(taken), Eigen::NoChange);
+      places.bottomRows(std::ssize(taken)) = positions(taken, Eigen::all);
     }
-  return vertices;
+  }
+  return places;
 }
 
 }  // namespace flash::sim

@@ -11,6 +11,10 @@ namespace flash::sim {
 /// Forces of end effectors and obstacles on all objects of a live scene together. They stay where they are.
 class LiveForces {
  public:
+  LiveForces() = default;
+  /// Of the obstacles, by these names, and of the holds that a scene's own file has.
+  LiveForces(const std::vector<Worlds>& worlds, const std::vector<std::string>& obstacles);
+
   /// Of what has these numbers in each of the worlds; a hold or an obstacle of -1 is none. What has the name
   /// of one before acts with it.
   void add(const std::string& name, std::vector<EndEffectorNumbers> numbers, int environments);
@@ -23,8 +27,8 @@ class LiveForces {
   /// environments x 3 [N].  Throws data::InputError.
   const std::vector<double>& of(const std::string& name) const;
 
-  /// Vertices of worlds number `w` that what has this name carries in an environment.
-  std::vector<int> held(const std::string& name, const Worlds& worlds, std::size_t w, int environment) const;
+  /// Where the vertices are that what has this name carries in an environment.  Throws data::InputError.
+  data::Points held_places(const std::string& name, const std::vector<Worlds>& worlds, int environment) const;
 
  private:
   struct Force {

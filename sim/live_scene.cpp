@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <deque>
-#include <limits>
 #include <numeric>
 
 #include "data/files/error.h"
-#include "data/numbers/worst.h"
 #include "sim/device_copies.h"
 #include "sim/live_forces.h"
 #include "sim/named.h"
@@ -30,33 +28,6 @@ struct LiveEffector {
 
 Tensor dense(const std::vector<double>& numbers, std::vector<std::int64_t> shape) {
   return {.data = numbers.data(), .shape = std::move(shape)};
-}
-
-/// Those of a body, by its own vertices.
-data::Triangles visible_triangles_of(const Body& body, const data::Triangles& all) {
-  std::vector<Eigen::Index> own;
-  for (Eigen::Index t = 0; t < all.rows(); ++t)
-    if (all(t, 0) >= body.first_vertex && all(t, 0) < body.first_vertex + body.vertex_count) own.push_back(t);
-  return all(own, Eigen::all).array() - body.first_vertex;
-}
-
-LiveObject object_of(const Sheet& sheet, std::size_t body, std::string name, std::size_t worlds) {
-  const Body& part = sheet.bodies[body];
-  return {.name = std::move(name),
-          .triangles = visible_triangles_of(part, visible_triangles(sheet)),
-          .is_solid = part.is_solid(),
-          .worlds = worlds,
-          .body = static_cast<int>(body),
-          .first_vertex = part.first_vertex,
-          .vertices = part.vertex_count};
-}
-
-void merge(const WorldStatus& other, WorldStatus& status) {
-  status.converged = std::min(status.converged, other.converged);
-  status.residual = data::worst(status.residual, other.residual);
-  status.penetration = data::worst(status.penetration, other.penetration);
-  status.parts = std::max(status.parts, other.parts);
-  if (status.lost == 0) status.lost = other.lost;
 }
 
 }  // namespace
@@ -206,7 +177,7 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, co
     s.starts.push_back(bodies[w].environment.state);
     const Sheet& sheet = bodies[w].sheet;
     for (std::size_t b = 0; b < sheet.bodies.size(); ++b)
-      s.objects.push_back(object_of(sheet, b, scene.objects[s.objects.size()].name, w));
+      s.objects.push_back(live_object(sheet, b, scene.objects[s.objects.size()].name, w));
   }
   for (const auto& names : {names_of(scene.obstacles), names_of(scene.end_effectors)})
     s.scene_names.insert(s.scene_names.end(), names.begin(), names.end());
@@ -214,19 +185,7 @@ LiveScene::LiveScene(const data::Scene& scene, int environments, int threads, co
   std::iota(s.every.begin(), s.every.end(), 0);
   s.status.resize(s.every.size());
   s.cameras = LiveCameras(names_of(s.objects), rigid_bodies(scene, s.worlds.front().environment(0)));
-  const std::vector<std::string> surfaces = obstacles();
-  for (int k = 0; k < std::ssize(surfaces); ++k)
-    s.forces.add(surfaces[static_cast<std::size_t>(k)],
-                 std::vector(s.worlds.size(), EndEffectorNumbers{.frame = -1, .hold = -1, .obstacle = k}),
-                 environments);
-  for (std::size_t w = 0; w < s.worlds.size(); ++w) {
-    const std::vector<Hold>& holds = s.worlds[w].given(0).holds;
-    for (int k = 0; k < std::ssize(holds); ++k) {
-      std::vector<EndEffectorNumbers> numbers(s.worlds.size(), {.frame = -1, .hold = -1, .obstacle = -1});
-      numbers[w].hold = k;
-      s.forces.add(holds[static_cast<std::size_t>(k)].name, std::move(numbers), environments);
-    }
-  }
+  s.forces = LiveForces(s.worlds, obstacles());
   if (device.device == Device::cuda)
     s.copies = std::make_unique<DeviceCopies>(device.cuda_devices.empty() ? 0 : device.cuda_devices.front());
   s.show();
@@ -442,15 +401,7 @@ std::vector<std::string> LiveScene::forces() const { return storage_->forces.nam
 data::Points LiveScene::held_places(const std::string& name, int environment) const {
   const Storage& s = *storage_;
   s.check_environment(environment);
-  data::Points places(0, 3);
-  for (std::size_t w = 0; w < s.worlds.size(); ++w) {
-    const std::vector<int> held = s.forces.held(name, s.worlds[w], w, environment);
-    const data::Points more = s.worlds[w].environment(environment).state.positions(held, Eigen::all);
-    data::Points all(places.rows() + more.rows(), 3);
-    all << places, more;
-    places = std::move(all);
-  }
-  return places;
+  return s.forces.held_places(name, s.worlds, environment);
 }
 
 Tensor LiveScene::pose(const std::string& end_effector) const {
@@ -518,12 +469,7 @@ data::TriangleMesh LiveScene::surface(const std::string& instance, int environme
     const data::Points& positions = s.worlds[object.worlds].environment(environment).state.positions;
     return {positions.middleRows(object.first_vertex, object.vertices), object.triangles};
   }
-  const RigidBody& body = s.cameras.bodies()[number - s.objects.size()];
-  const Environment& now = *s.latest(environment);
-  const Eigen::Isometry3d pose = frame_pose(now, body.frame, now.state.time);
-  data::TriangleMesh mesh = body.surface;
-  mesh.vertices = (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
-  return mesh;
+  return surface_now(s.cameras.bodies()[number - s.objects.size()], *s.latest(environment));
 }
 
 std::vector<std::string> LiveScene::cameras() const { return storage_->cameras.names(); }

@@ -9,20 +9,11 @@
 #include "data/mesh/mesh.h"
 #include "data/scene/scene.h"
 #include "sim/live_cameras.h"
+#include "sim/live_object.h"
 #include "sim/material_numbers.h"
 #include "sim/worlds.h"
 
 namespace flash::sim {
-
-/// An object of a live scene.
-struct LiveObject {
-  std::string name;
-  data::Triangles triangles;  ///< that can be seen, by the object's own vertices, from 0
-  bool is_solid = false;
-  std::size_t worlds = 0;  ///< number of the worlds that have it; objects that meet share one
-  int body = 0;            ///< of their plan
-  std::int64_t first_vertex = 0, vertices = 0;
-};
 
 /// The objects of a scene in many environments that stay alive, with end effectors that code adds, moves,
 /// closes and opens. What moves by the scene's own file goes on doing so. Of what Worlds promises all holds.

@@ -7,6 +7,7 @@
 #include "data/files/text.h"
 #include "data/machine/memory_limit.h"
 #include "data/machine/parallel.h"
+#include "data/numbers/worst.h"
 #include "sim/newton/solver_memory.h"
 #include "sim/step/body_law.h"
 
@@ -132,6 +133,14 @@ double stop_motion(std::vector<Worlds>& worlds) {
     of_object.set_velocities({}, {.data = still.data(), .shape = now.shape});
   }
   return fastest;
+}
+
+void merge(const WorldStatus& other, WorldStatus& status) {
+  status.converged = std::min(status.converged, other.converged);
+  status.residual = data::worst(status.residual, other.residual);
+  status.penetration = data::worst(status.penetration, other.penetration);
+  status.parts = std::max(status.parts, other.parts);
+  if (status.lost == 0) status.lost = other.lost;
 }
 
 }  // namespace flash::sim

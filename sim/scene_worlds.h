@@ -28,4 +28,7 @@ double stop_motion(std::vector<Worlds>& worlds);
 /// How many vertices the objects have together.
 std::size_t vertices_of(const std::vector<SceneBody>& bodies);
 
+/// The status of an environment whose objects are in several worlds: the worst of theirs.
+void merge(const WorldStatus& other, WorldStatus& status);
+
 }  // namespace flash::sim
