@@ -167,7 +167,7 @@ void print_joints(const calib::Calibration& c, const calib::Extrinsics& extrinsi
          1e3, "mm");
 }
 
-void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
+void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics, const HandEyeOptions& options) {
   const Eigen::Vector3d t = extrinsics.transform.T.translation();
   constexpr double kDegrees = 180 / M_PI;
   const char* const parent = extrinsics.transform.parent.c_str();
@@ -202,6 +202,10 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   } else if (c.size && c.size->sd > 0) {
     std::printf("target: %.4f +- %.4f times as large as stated\n", c.size->estimate, c.size->sd);
   }
+  if (c.focal_length)
+    std::printf("focal length: %.4f +- %.4f times that with which the target's poses were made%s\n",
+                c.focal_length->estimate, c.focal_length->sd,
+                options.lens.knowledge == calib::LensKnowledge::near ? " (--lens stated takes that)" : "");
   print_joints(c, extrinsics);
   const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
   if (depth && depth->used)
@@ -289,6 +293,17 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
   return solved;
 }
 
+/// Pairs have no pixels, and their lens is that of whoever made them.
+void expect_pair_options(const HandEyeOptions& options, const calib::Dataset& dataset) {
+  if (!dataset.frames.front().T_camera_target) return;
+  if (options.use == calib::Use::image)
+    throw data::InputError("--for: found image, expected workspace or two-arms: pairs of poses, " +
+                           dataset.source + ", have no pixels");
+  if (!options.lens.own.empty())
+    throw data::InputError("--lens: found " + options.lens.own + ", expected stated or solved: of pairs of " +
+                           "poses, " + dataset.source + ", the lens has been used already");
+}
+
 int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   expect_no_camera(options.lens, options.dataset.camera);
   if (!options.lens.own.empty()) options.dataset.camera = options.lens.own;
@@ -302,6 +317,7 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
   expect_no_picture_options(verb, dataset);
+  expect_pair_options(options, dataset);
   expect_own_files(outputs, files_read(options.dataset, dataset, options.common));
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
@@ -359,7 +375,7 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   if (options.common.json)
     std::cout << text;
   else
-    print(solved.calibration, extrinsics);
+    print(solved.calibration, extrinsics, options);
   if (exit_code == exit_unusable) say_unusable(solved.calibration.refusals.front());
   return exit_code;
 }

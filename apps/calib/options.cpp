@@ -206,8 +206,7 @@ std::vector<std::string> files_read(const DatasetChoice& choice, const calib::Da
 
 void expect_no_picture_options(const CLI::App& verb, const calib::Dataset& dataset) {
   if (!dataset.frames.front().T_camera_target) return;
-  for (const char* name :
-       {"--target", "--poses", "--angles", "--robot", "--camera", "--lens", "--camera-info"}) {
+  for (const char* name : {"--target", "--poses", "--angles", "--robot", "--camera", "--camera-info"}) {
     const CLI::Option* option = verb.get_option_no_throw(name);
     if (option != nullptr && option->count() > 0)
       throw data::InputError(std::string(name) + ": found pairs of poses, " + dataset.source +

@@ -53,8 +53,9 @@ nlohmann::ordered_json plan_json(const calib::Plan& plan, const PlanOptions& opt
 }
 
 void print(const calib::Plan& plan) {
-  std::printf("now: +- %.3g mm, %.3g deg an axis; of the candidates %d see the whole target\n",
-              1e3 * plan.translation_sd, kDegrees * plan.rotation_sd, plan.visible);
+  std::printf(
+      "now, by noise alone: +- %.3g mm, %.3g deg an axis; of the candidates %d see the whole target\n",
+      1e3 * plan.translation_sd, kDegrees * plan.rotation_sd, plan.visible);
   for (std::size_t i = 0; i < plan.poses.size(); ++i) {
     const Eigen::Vector3d t = plan.poses[i].T_base_gripper.translation();
     const Eigen::Quaterniond q(plan.poses[i].T_base_gripper.linear());

@@ -353,6 +353,7 @@ void print(const calib::Cell& cell, const RegisterOptions& options) {
                 1e3 * sd[0], 1e3 * sd[1], 1e3 * sd[2], sd[3] * 180 / M_PI, sd[4] * 180 / M_PI,
                 sd[5] * 180 / M_PI);
   };
+  std::printf("one standard deviation along and about the axes of the frame on the left:\n");
   for (const calib::CellFrame& base : cell.bases) {
     line(base);
     if (options.workspace.empty()) continue;

@@ -98,6 +98,7 @@ struct Calibration {
   std::optional<PlaceAlong> along;  ///< of a robot that turns about one axis, or nearly
   WeakestDirection weakest;
   std::optional<TargetSize> size;
+  std::optional<TargetSize> focal_length;  ///< of pairs: over that with which target poses were made
   double size_begun = 1;             ///< of the target over the stated one, with which the solution began
   std::vector<SplitCheck> splits;    ///< of X, interleaved first; none where there are too few views
   double covariance_factor = 1;      ///< by which the splits have widened the covariance

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/calibrate/pair_scales.h"
 #include "calib/calibrate/stated_uncertainty.h"
 #include "calib/solve/pose_space.h"
 #include "calib/uncertainty/smooth_errors_of_pairs.h"
@@ -88,121 +89,14 @@ void check_halves(Calibration& result, const std::vector<PoseLoop>& loops,
   result.warnings.emplace_back(text);
 }
 
-constexpr double kUsualSize = 0.01;  // standard deviation of what a size that is stated is off by
-
-/// The size that pairs want, with nothing known of it. None where they do not tell it to a tenth.
-std::optional<TargetSize::Wanted> wanted_size(const std::vector<PoseLoop>& loops,
-                                              const std::vector<Eigen::Vector3d>& places,
-                                              const HandEyePoses& seed,
-                                              const std::optional<AlongPrior>& along) {
-  constexpr double kUnknown = 0.1;
-  const PoseSpaceFit fit = fit_pose_space(loops, seed, SizeUnknown{}, along);
-  const double noise = std::sqrt(fit.covariance(12, 12));
-  if (!fit.converged || !(noise < kUnknown)) return std::nullopt;
-  // Whose the noise is.
-  const double of_robot = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 0}, along).size,
-               of_camera = fit_pose_space(loops, seed, SizeUnknown{.camera_share = 1}, along).size;
-  // What the halves of the robot's places do not agree on, none of them sees by itself.
-  double apart = 0;
-  constexpr Split kSplits[] = {Split::consecutive, Split::place_1, Split::place_2, Split::place_3};
-  for (const Split split : kSplits) {
-    const std::vector<int> half = halves_of(places, split);
-    std::vector<PoseLoop> parts[2];
-    for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
-    const double ratio = fit_pose_space(parts[0], fit.poses, SizeUnknown{}, along).size /
-                         fit_pose_space(parts[1], fit.poses, SizeUnknown{}, along).size;
-    apart += std::pow(0.5 * std::log(ratio), 2) / static_cast<double>(std::size(kSplits));
-  }
-  return TargetSize::Wanted{fit.size, fit.size * std::hypot(std::max(noise, std::sqrt(apart)),
-                                                            0.5 * std::log(of_camera / of_robot))};
-}
-
-/// What the size is taken to be, and the pairs as seen of a target of that size.
-TargetSize settle_size(std::vector<PoseLoop>& loops, const std::vector<Eigen::Vector3d>& places,
-                       const HandEyePoses& seed, const std::optional<AlongPrior>& along,
-                       const CalibrateSettings& settings) {
-  TargetSize size{.prior_sd = settings.target_size_sd.value_or(kUsualSize)};
-  constexpr std::size_t kEnough = 8;
-  if (loops.size() >= kEnough) size.wanted = wanted_size(loops, places, seed, along);
-  if (std::isinf(size.prior_sd) && !size.wanted)
-    throw data::InputError(
-        "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
-        "out, or add views farther apart");
-  if (size.prior_sd == 0 || settings.size_as_stated || !size.wanted) return size;
-  // Of what is known and what pairs want, by their deviations.
-  const double known = std::isinf(size.prior_sd) ? 0 : std::pow(size.prior_sd, -2),
-               seen = std::pow(size.wanted->sd, -2);
-  size.estimate = (known + seen * size.wanted->estimate) / (known + seen);
-  size.sd = 1 / std::sqrt(known + seen);
-  loops = resized(std::move(loops), size.estimate);
-  return size;
-}
-
-/// How X follows a size that is off by `sd`.
-Matrix6d covariance_of_size(const std::vector<PoseLoop>& loops, const HandEyePoses& poses,
-                            const std::optional<AlongPrior>& along, double sd) {
-  constexpr double kStep = 1e-3;
-  const auto with = [&](double size) {
-    return fit_pose_space(resized(loops, size), poses, {}, along).poses.X;
-  };
-  const Vector6d shift = motion_between(with(1 - kStep), with(1 + kStep)) * (sd / (2 * kStep));
-  return shift * shift.transpose();
-}
-
-/// A size that pairs exclude is the cause of whatever else does not fit, and of an answer that depends on it.
-void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,
-               const std::optional<AlongPrior>& along, const CalibrateSettings& settings) {
-  const TargetSize& size = *result.size;
-  if (!size.far_off()) return;
-  const auto away_with = [&](double other) {
-    const PoseSpaceFit fit = fit_pose_space(resized(loops, other / size.estimate), result.poses, {}, along);
-    return motion_between(result.poses.X, fit.poses.X);
-  };
-  const auto excluded = [&](const Vector6d& away) {
-    return away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_95_of_6;
-  };
-  const Vector6d away = away_with(size.wanted->estimate), as_stated = away_with(1);
-  const bool depends = excluded(away) || excluded(as_stated);
-  if (settings.size_as_stated) result.covariance += away * away.transpose();
-  const Vector6d& farther = as_stated.head<3>().norm() > away.head<3>().norm() ? as_stated : away;
-  char text[400];
-  std::snprintf(
-      text, sizeof text,
-      "the target is %.4g times as large as stated (+- %.2g, 2 sd), or the robot's translations are not "
-      "in metres: measure a square; the answer is for %.4g, and with the stated or the other size the camera "
-      "is up to "
-      "%.1f mm and %.2f deg from where it is here (--target-size solved takes the estimate)",
-      size.wanted->estimate, 2 * size.wanted->sd, size.estimate, 1e3 * farther.head<3>().norm(),
-      farther.tail<3>().norm() * 180 / M_PI);
-  tell_first(result, text, depends && !settings.size_as_stated);
-}
-
-/// Few pairs do not tell a size beside their noise, but whether they close with another one.
-void tell_size_of_few(Calibration& result, const std::vector<Observation>& all,
-                      const CalibrateSettings& settings) {
-  if (result.size->wanted) return;
-  ConventionSettings any = settings.convention;
-  any.suspicious = 0;  // a size that is off by a fifth still closes well
-  const auto sized = check_size(result.setup, all, {Symmetry{}}, result.selection.robust_seed, any);
-  if (sized) tell_first(result, sized->sentence, !settings.size_as_stated);
-}
-
 /// Robot and target that are exchanged close as well, and so do both inverted. What tells it is where a
 /// camera can see a target: before it, and not far off its axis.
 void tell_unseen(Calibration& result, const std::vector<Observation>& observations) {
-  constexpr double kSteepest = 3.7;  // tangent of 75 deg
-  std::size_t count = 0, unseen = 0;
-  for (const Observation& observation : observations) {
-    if (observation.T_camera_target.empty()) continue;
-    const Eigen::Vector3d t = observation.T_camera_target.front().translation();
-    ++count;
-    unseen += t.z() > 0 && t.head<2>().norm() < kSteepest * t.z() ? 0 : 1;
-  }
-  constexpr std::size_t kFew = 10;  // one in so many may be an outlier
-  if (kFew * unseen <= count) return;
+  const Unseen unseen = unseen_targets(observations);
+  if (!unseen.plainly()) return;
   tell_first(result,
              "the target is behind the camera, or more than 75 deg off its axis, in " +
-                 std::to_string(unseen) + " of " + std::to_string(count) +
+                 std::to_string(unseen.count) + " of " + std::to_string(unseen.of) +
                  " pairs, where no camera sees it: are the poses of robot and target exchanged, or inverted?",
              false);
 }
@@ -223,7 +117,7 @@ void tell_exchanged(Calibration& result) {
 
 /// A camera or a target that moved at once, of all pairs in their order. Where it did so plainly, and the
 /// stated deviations do not hold it, there is no answer.
-void tell_step(Calibration& result, const std::vector<Observation>& all) {
+void tell_step(Calibration& result, const std::vector<Observation>& all, SeenScales scales) {
   std::vector<PoseLoop> loops;
   std::vector<std::string> names;
   for (const Observation& pair : all) {
@@ -231,8 +125,8 @@ void tell_step(Calibration& result, const std::vector<Observation>& all) {
     loops.push_back(pose_loop(result.setup, pair.T_base_gripper, pair.T_camera_target.front()));
     names.push_back(pair.image);
   }
-  const auto step =
-      step_of_pairs(resized(std::move(loops), result.size->estimate * result.size_begun), result.poses);
+  scales.size *= result.size_begun;
+  const auto step = step_of_pairs(rescaled(std::move(loops), scales), result.poses);
   if (!step) return;
   constexpr double kPlain = 5;  // scatters: nothing else parts pairs so far
   const bool held = step->distance < kPlain ||
@@ -249,16 +143,20 @@ void tell_step(Calibration& result, const std::vector<Observation>& all) {
 
 /// What errors that change smoothly with the robot's pose may have done, beside what scatters.
 void add_smooth_errors(Calibration& result, const std::vector<Observation>& observations,
-                       const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit,
+                       const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit, const PairScales& scales,
                        const std::optional<AlongPrior>& along) {
   std::vector<Eigen::Isometry3d> poses;
   for (const Observation& observation : observations) poses.push_back(observation.T_base_gripper);
   const SmoothErrorsOfPairs smooth = smooth_errors_of_pairs(
-      result.setup, poses, loops, fit, {result.repeatable, result.size->sd, result.size->prior_sd}, along);
+      result.setup, poses, loops, fit, {result.covariance, scales.covariance, scales.information}, along);
   result.pose_errors = smooth.arm;
   result.covariance = smooth.covariance;
   raise_to(result.repeatable, result.covariance);
-  result.size->sd = std::max(result.size->sd, smooth.size_sd);
+  const auto raise = [&](TargetSize& scale, Eigen::Index i) {
+    scale.sd = std::max(scale.sd, scale.estimate * std::sqrt(smooth.scales(i, i)));
+  };
+  raise(*result.size, 0);
+  if (result.focal_length) raise(*result.focal_length, 1);
   tell_smooth_errors(result, growth(result.repeatable, result.covariance));
 }
 
@@ -279,7 +177,9 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   std::optional<AlongPrior> along;
   const double distance = usual_distance(observations);
   if (axis) along = loose_along(*axis, seed, distance);
-  result.size = settle_size(loops, places, seed, along, settings);
+  const PairScales scales = settle_scales(loops, observations, seed, along, settings);
+  result.size = scales.size;
+  result.focal_length = scales.focal_length;
   PoseSpaceFit fit = fit_pose_space(loops, seed, {}, along);
   if (axis) {
     // The robot's turns are taken as they are reported: their noise pulls the place as far as the target.
@@ -310,16 +210,18 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .poses = fit.poses,
                                .relative = relative_rms(compared, fit.poses.X),
                                .held_out = result.held_out});
-  if (result.size->sd > 0)
-    result.repeatable = result.covariance += covariance_of_size(loops, fit.poses, along, result.size->sd);
-  add_smooth_errors(result, observations, loops, fit, along);
+  const Eigen::Matrix<double, 6, 2> by_scales = camera_by_scales(loops, fit.poses, along);
+  result.covariance += by_scales * scales.covariance * by_scales.transpose();
+  result.repeatable += by_scales * scales.repeatable * by_scales.transpose();
+  add_smooth_errors(result, observations, loops, fit, scales, along);
+  result.covariance += std::pow(scales.kept_size_sd, 2) * by_scales.col(0) * by_scales.col(0).transpose();
   check_halves(result, loops, places, along);
   finish(result, observations);
-  tell_size(result, loops, along, settings);
+  tell_scales(result, loops, along, settings);
   tell_size_of_few(result, all, settings);
   tell_unseen(result, observations);
   tell_exchanged(result);
-  if (!axis) tell_step(result, all);
+  if (!axis) tell_step(result, all, scales.estimate());
   result.size->estimate *= result.size_begun;
   result.size->sd *= result.size_begun;
   if (result.size->wanted) {

@@ -280,6 +280,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"weakest_deg", kDegrees * calibration.weakest.rotation}};
   json["convention_findings"] = Json::array();
   json["scale"] = calibration.size ? to_json(*calibration.size) : Json(nullptr);
+  json["focal_length"] = calibration.focal_length ? to_json(*calibration.focal_length) : Json(nullptr);
   if (calibration.size && has_pixels(calibration)) {
     json["scale"]["warp_mm"] = list(Warp(1e3 * calibration.warp.estimate));
     json["scale"]["warp_sd_mm"] = list(Warp(1e3 * calibration.warp.sd));

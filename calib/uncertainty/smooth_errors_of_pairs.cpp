@@ -33,7 +33,11 @@ SmoothErrorsOfPairs smooth_errors_of_pairs(Setup setup, const std::vector<Eigen:
                                            const std::vector<PoseLoop>& loops, const PoseSpaceFit& fit,
                                            const ScatterOfPairs& scatter,
                                            const std::optional<AlongPrior>& along) {
-  const Eigen::Index poses = 12, s = poses + (scatter.size_sd > 0 ? 1 : 0);
+  const Eigen::Index poses = 12;
+  std::vector<Eigen::Index> solved;  // scales
+  for (const Eigen::Index i : {0, 1})
+    if (scatter.scales(i, i) > 0) solved.push_back(i);
+  const Eigen::Index s = poses + static_cast<Eigen::Index>(solved.size());
   // Of the variance of a pair's scatter: the rest is estimated beside each field.
   constexpr double kKnown = 0.01;
   const Eigen::Vector2d noise(std::pow(fit.translation.across, 2), std::pow(fit.rotation, 2));
@@ -43,7 +47,10 @@ SmoothErrorsOfPairs smooth_errors_of_pairs(Setup setup, const std::vector<Eigen:
   for (const Eigen::Isometry3d& T : T_base_gripper)
     middle += T.translation() / static_cast<double>(T_base_gripper.size());
   Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(s + 1, s + 1);
-  if (s > poses) prior(poses, poses) = std::pow(scatter.size_prior, -2);
+  for (std::size_t i = 0; i < solved.size(); ++i) {
+    const Eigen::Index at = poses + static_cast<Eigen::Index>(i);
+    prior(at, at) = scatter.known[solved[i]];
+  }
   if (along) {
     const AlongResidual known = along_residual(*along, along->target ? fit.poses.Z : fit.poses.X);
     const Eigen::Index at = along->target ? 6 : 0;
@@ -58,7 +65,7 @@ SmoothErrorsOfPairs smooth_errors_of_pairs(Setup setup, const std::vector<Eigen:
     const LinearLoop linear = linear_loop(loops[i], fit.poses);
     Eigen::MatrixXd by_shared(6, s);
     by_shared.leftCols(poses) = linear.by_poses;
-    if (s > poses) by_shared.col(poses) = linear.by_size;
+    by_shared.rightCols(s - poses) = linear.by_scales(Eigen::all, solved);
     const Matrix6d J = by_error(setup, T_base_gripper[i], linear, fit.poses),
                    columns = scatter_columns(linear, fit);
     const Matrix6d W = (columns * variances.asDiagonal() * columns.transpose()).inverse(), known = W / kKnown;
@@ -82,8 +89,9 @@ SmoothErrorsOfPairs smooth_errors_of_pairs(Setup setup, const std::vector<Eigen:
   const Eigen::MatrixXd moved_by = solution.solve(gains);
   Eigen::MatrixXd instead = moved_by * arm.covariance * moved_by.transpose();
   instead += arm.errors.share * solution.solve(solution.solve(prior.topLeftCorner(s, s)).transpose());
-  SmoothErrorsOfPairs result{arm.errors, rest * scatter.covariance + instead.topLeftCorner<6, 6>()};
-  if (s > poses) result.size_sd = std::sqrt(rest * std::pow(scatter.size_sd, 2) + instead(poses, poses));
+  SmoothErrorsOfPairs result{arm.errors, rest * scatter.covariance + instead.topLeftCorner<6, 6>(),
+                             rest * scatter.scales};
+  result.scales(solved, solved) += instead.bottomRightCorner(s - poses, s - poses);
   return result;
 }
 

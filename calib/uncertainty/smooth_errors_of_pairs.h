@@ -10,15 +10,15 @@ namespace flash::calib {
 /// What errors of the arm that change smoothly with its pose may have done to the answer of pairs.
 struct SmoothErrorsOfPairs {
   CorrelatedPoseErrors arm;
-  Matrix6d covariance;  ///< of X, in place of what the independent scatter alone makes
-  double size_sd = 0;   ///< likewise of the size of the target, where that was solved for
+  Matrix6d covariance;     ///< of X, in place of what the independent scatter alone makes
+  Eigen::Matrix2d scales;  ///< likewise of the logs of SeenScales, where they were solved for
 };
 
 /// What independent scatter alone makes of an answer of pairs.
 struct ScatterOfPairs {
-  Matrix6d covariance;    ///< of X
-  double size_sd = 0;     ///< of the size of the target; 0: it was not solved for
-  double size_prior = 0;  ///< standard deviation of what was known of it beforehand; may be infinity
+  Matrix6d covariance;     ///< of X
+  Eigen::Matrix2d scales;  ///< of the logs of SeenScales; 0: one that was not solved for
+  Eigen::Vector2d known;   ///< information of what was known of them beforehand
 };
 
 /// As systematic_uncertainty() has it of pictures. The scatter of a pair, of robot and camera together,

@@ -1,5 +1,7 @@
 #include "data/files/npz.h"
 
+#include <zlib.h>
+
 #include <cstdint>
 #include <cstring>
 #include <optional>
@@ -125,6 +127,23 @@ NumpyArray array_of(std::string_view npy) {
   return array;
 }
 
+/// What a file of `size` bytes was before it was compressed; empty where it is damaged.
+std::string inflated(std::string_view bytes, std::size_t size) {
+  constexpr std::size_t kMostPerByte = 1100, kLeast = 1 << 16;  // of what the format can hold
+  if (size > kMostPerByte * bytes.size() + kLeast) return {};
+  std::string text(size, '\0');
+  z_stream stream{};
+  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) return {};  // as ZIP has it, without a head
+  std::string in(bytes);
+  stream.next_in = reinterpret_cast<Bytef*>(in.data());
+  stream.avail_in = static_cast<uInt>(in.size());
+  stream.next_out = reinterpret_cast<Bytef*>(text.data());
+  stream.avail_out = static_cast<uInt>(text.size());
+  const int ended = inflate(&stream, Z_FINISH);
+  inflateEnd(&stream);
+  return ended == Z_STREAM_END && stream.total_out == size ? text : std::string();
+}
+
 }  // namespace
 
 std::map<std::string, NumpyArray> load_npz(const std::string& path) {
@@ -136,7 +155,9 @@ std::map<std::string, NumpyArray> load_npz(const std::string& path) {
   const auto count = at<std::uint16_t>(file, end + 10, path);
   for (std::uint16_t i = 0; i < count; ++i) {
     const auto method = at<std::uint16_t>(file, entry + 10, path);
-    const auto size = at<std::uint32_t>(file, entry + 20, path);
+    const auto checksum = at<std::uint32_t>(file, entry + 16, path),
+               size = at<std::uint32_t>(file, entry + 20, path),
+               whole_size = at<std::uint32_t>(file, entry + 24, path);
     const auto name_length = at<std::uint16_t>(file, entry + 28, path);
     const auto extra = at<std::uint16_t>(file, entry + 30, path),
                comment = at<std::uint16_t>(file, entry + 32, path);
@@ -144,11 +165,20 @@ std::map<std::string, NumpyArray> load_npz(const std::string& path) {
     at<char>(file, entry + 46 + name_length, path);
     std::string name = file.substr(entry + 46, name_length);
     if (name.ends_with(".npy")) name.resize(name.size() - 4);
-    if (method != 0) throw InputError(path + ": " + name + " is compressed; write it with numpy.savez");
+    constexpr std::uint16_t kStored = 0, kDeflated = 8;
+    if (method != kStored && method != kDeflated)
+      throw InputError(path + ": " + name +
+                       ": is compressed in a way that numpy does not use; write it with numpy.savez");
     const std::size_t begin =
         local + 30 + at<std::uint16_t>(file, local + 26, path) + at<std::uint16_t>(file, local + 28, path);
     if (begin + size > file.size()) throw InputError(path + ": " + name + ": ends within its data");
-    arrays[name] = array_of(std::string_view(file).substr(begin, size));
+    const std::string_view stored = std::string_view(file).substr(begin, size);
+    const std::string text = method == kDeflated ? inflated(stored, whole_size) : std::string();
+    const std::string_view bytes = method == kDeflated ? std::string_view(text) : stored;
+    if (crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())) != checksum)
+      throw InputError(path + ": " + name +
+                       ": is damaged: found another checksum than that of its data, expected the same");
+    arrays[name] = array_of(bytes);
     entry += 46U + name_length + extra + comment;
   }
   return arrays;

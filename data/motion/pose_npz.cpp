@@ -1,5 +1,6 @@
 #include "data/motion/pose_npz.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cctype>
 
@@ -75,6 +76,20 @@ std::vector<std::vector<double>> joined(const std::vector<std::vector<double>>& 
   return rows;
 }
 
+/// Rotations as matrices or, as OpenCV has them too, as vectors along their axes, of their angles' lengths.
+std::vector<std::vector<double>> rotations_in(const NumpyArray& array) {
+  if (std::vector<std::vector<double>> matrices = rows_of(array, 9); !matrices.empty()) return matrices;
+  std::vector<std::vector<double>> rows = rows_of(array, 3);
+  for (std::vector<double>& row : rows) {
+    const Eigen::Vector3d vector(row[0], row[1], row[2]);
+    const double angle = vector.stableNorm();
+    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R =
+        angle > 0 ? Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix() : Eigen::Matrix3d::Identity();
+    row.assign(R.data(), R.data() + 9);
+  }
+  return rows;
+}
+
 /// The poses of a stack, as numbers; empty where it is none.
 std::vector<std::vector<double>> poses_in(const NumpyArray& array) {
   for (const std::size_t width : {16, 12, 7})
@@ -89,7 +104,7 @@ std::vector<std::vector<double>> stack_of(const Arrays& arrays, Names names, con
     if (std::vector<std::vector<double>> rows = poses_in(*whole); !rows.empty()) return rows;
   const NumpyArray *R = find(arrays, {rotation}), *t = find(arrays, {place});
   if (R == nullptr || t == nullptr) return {};
-  return joined(rows_of(*R, 9), rows_of(*t, 3));
+  return joined(rotations_in(*R), rows_of(*t, 3));
 }
 
 bool is_of_poses(const std::string& name) {

@@ -13,6 +13,16 @@ struct NamedArray {
   bool columns_first = false;  ///< likewise
 };
 
+/// CRC-32 (ISO 3309), bit by bit.
+inline std::uint32_t crc32_of(const std::string& text) {
+  std::uint32_t crc = 0xFFFFFFFF;
+  for (const char c : text) {
+    crc ^= static_cast<unsigned char>(c);
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1 ? 0xEDB88320 : 0);
+  }
+  return ~crc;
+}
+
 /// An .npz with these arrays of doubles, not compressed.
 inline std::string npz_text(const std::vector<NamedArray>& arrays) {
   std::string file, contents;
@@ -37,7 +47,8 @@ inline std::string npz_text(const std::vector<NamedArray>& arrays) {
     number(file, size);
     number(file, length);
     file += std::string(2, '\0') + entry + npy;
-    contents += std::string("PK\x01\x02", 4) + std::string(16, '\0');
+    contents += std::string("PK\x01\x02", 4) + std::string(12, '\0');
+    number(contents, crc32_of(npy));
     number(contents, size);
     number(contents, size);
     number(contents, length);

@@ -125,9 +125,9 @@ def longer(T, factor):
     return [[*row[:3], row[3] * factor] for row in T[:3]] + [T[3]]
 
 
-def save_npz(path, **stacks):
-    """As numpy.savez writes stacks of matrices."""
-    with zipfile.ZipFile(path, "w") as archive:
+def save_npz(path, compression=zipfile.ZIP_STORED, **stacks):
+    """As numpy.savez and numpy.savez_compressed write stacks of matrices."""
+    with zipfile.ZipFile(path, "w", compression) as archive:
         for name, stack in stacks.items():
             head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({len(stack)}, 4, 4), }}".encode()
             head += b" " * (-(len(head) + 11) % 64) + b"\n"
@@ -281,6 +281,19 @@ def npz_pairs(folder, sets):
     return ["handeye", save_npz(folder / "pairs.npz", T_base_ee=cell.robot, T_cam_board=cell.seen), "--setup", "eye-in-hand"]
 
 
+def compressed_npz_pairs(folder, sets):
+    cell = Cell()
+    return ["handeye", save_npz(folder / "pairs.npz", zipfile.ZIP_DEFLATED, T_base_ee=cell.robot, T_cam_board=cell.seen), "--setup", "eye-in-hand"]
+
+
+def damaged_npz_pairs(folder, sets):
+    words = npz_pairs(folder, sets)
+    file = bytearray((folder / "pairs.npz").read_bytes())
+    file[len(file) // 2] ^= 1
+    (folder / "pairs.npz").write_bytes(file)
+    return words
+
+
 def two_clocks(folder):
     """Pictures by the simulator's time, poses by the wall clock's."""
     for k, path in enumerate(sorted((folder / "images").iterdir())):
@@ -352,6 +365,9 @@ def reports():
     yield Report("RealMan#12, not inverted", pictures(side_by_side(False)), ANSWERED, "matrices side by side")
     yield Report("easy_handeye#140", pictures(two_clocks), REFUSED, "685", "1715408108", "simulated time", "wall clock")
     yield Report("npz of pairs", npz_pairs, ANSWERED)
+    yield Report("npz of pairs, compressed", compressed_npz_pairs, ANSWERED)
+    yield Report("npz of pairs, damaged", damaged_npz_pairs, REFUSED, "is damaged")
+    yield Report("pairs and pixels", pairs_with("--for", "image"), REFUSED, "--for", "have no pixels")
     yield Report("npz of poses beside pictures", pictures(as_npz), ANSWERED, "in the order of the pictures")
     yield Report("npz of four samples", four_that_do_not_belong, REFUSED, "robot and camera do not tell of the same motion",
                  "the robot turns by 137", "27.0 deg", unsaid=("--angles", "inverted", "w x y z", "paired off"))

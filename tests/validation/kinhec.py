@@ -149,7 +149,7 @@ def main():
     parser.add_argument("--tier", default="smoke", help="of kinhec: smoke, small, medium, full, or a YAML file")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for sequences, pairs and answers")
     parser.add_argument("--data", type=pathlib.Path, help="sequences that kinhec generate has written before")
-    parser.add_argument("--size-known", action="store_true", help="state the target's size as exact (--target-size-sd 0)")
+    parser.add_argument("--size-known", action="store_true", help="state size of the target and lens as exact (--target-size-sd 0 --lens stated)")
     args = parser.parse_args()
     if benchmark is None:
         print("skipped: the package kinhec is not installed (pip install kinhec)")
@@ -159,7 +159,7 @@ def main():
     answers.mkdir(parents=True, exist_ok=True)
     data = args.data or generated(args.tier, args.out)
     manifest = load_manifest(data)
-    extra = ["--target-size-sd", "0"] if args.size_known else []
+    extra = ["--target-size-sd", "0", "--lens", "stated"] if args.size_known else []
     sequences = (load_sequence(data, name, manifest) for name in manifest["sequence_id"])
     rows = [study(args.calib.resolve(), sequence, answers, extra) for sequence in sequences]
     (args.out / "rows.json").write_text(json.dumps(rows, indent=1))

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "calib/calibrate/calibrate_pairs.h"
+#include "calib/geometry/pose_from_pixels.h"
 #include "tests/calib/knocked_scene.h"
 #include "tests/data/temporary_folder.h"
 
@@ -83,7 +84,8 @@ TEST(Pairs, OfAStreamAreComparedOnSomeOfThemAndAllSolved) {
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].T_camera_target = {scene.truth.X.inverse() * scene.true_poses[i].inverse() * scene.truth.Z};
   CalibrateSettings settings;
-  settings.target_size_sd = 0;  // a size that is solved for is less known than places
+  settings.target_size_sd = 0;  // a size that is solved for is less known than places, and so is a lens
+  settings.lens = LensKnowledge::stated;
   std::size_t most = 0;
   settings.closed_forms = {{"park",
                             [&](const std::vector<PoseLoop>& loops) -> std::optional<HandEyePoses> {
@@ -244,6 +246,47 @@ TEST(Pairs, OfATargetOfNearlyTheSizeStatedAreAnsweredForTheSizeThatTheyTell) {
         const Calibration result = calibrate_pairs(setup, pairs);
         EXPECT_TRUE(result.usable && within_999(result, scene)) << size << ' ' << seed;
         EXPECT_LT(std::abs(result.size->estimate - size), 4 * result.size->sd) << size << ' ' << seed;
+      }
+}
+
+/// With poses of the target that a camera made whose focal length was stated so many times too long.
+std::vector<Observation> pairs_of_lens(const HandEyeScene& scene, double too_long) {
+  std::vector<Observation> pairs = pairs_of(scene);
+  data::CameraIntrinsics camera = scene.camera;
+  camera.fx *= too_long;
+  camera.fy *= too_long;
+  // About the middle a wrong focal length leaves how deep the target is.
+  const Eigen::Translation3d middle(scene.points.rowwise().mean());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Observation& view = scene.observations[i];
+    pairs[i].T_camera_target = {fitted_pose(camera, scene.points(Eigen::all, view.points), view.pixels,
+                                            view.T_camera_target.front()) *
+                                middle};
+  }
+  return pairs;
+}
+
+bool tells_of_lens(const Calibration& result) {
+  return std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
+    return warning.starts_with("the camera's focal length is ");
+  });
+}
+
+TEST(Pairs, OfALensThatIsOffAreAnsweredForTheFocalLengthThatTheyTell) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const double too_long : {0.97, 0.99, 1.0, 1.01, 1.03})
+      for (const unsigned seed : {21U, 22U, 23U}) {
+        const HandEyeScene scene = noisy_scene(setup, 0.1, 0, seed);
+        const std::vector<Observation> pairs = pairs_of_lens(scene, too_long);
+        const Calibration result = calibrate_pairs(setup, pairs);
+        EXPECT_TRUE(result.usable && within_999(result, scene)) << too_long << ' ' << seed;
+        ASSERT_TRUE(result.focal_length && result.focal_length->wanted);
+        EXPECT_LT(std::abs(result.focal_length->estimate - 1 / too_long), 4 * result.focal_length->sd)
+            << too_long << ' ' << seed;
+        EXPECT_EQ(tells_of_lens(result), std::abs(too_long - 1) > 0.015) << too_long << ' ' << seed;
+        CalibrateSettings kept;
+        kept.lens = LensKnowledge::stated;
+        EXPECT_FALSE(calibrate_pairs(setup, pairs, kept).focal_length);
       }
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "data/numbers/chi_square.h"
@@ -122,18 +123,42 @@ TEST(PoseSpace, NoiseThatIsAlikeAllAroundCostsNothing) {
   }
 }
 
-// What a camera errs by along the line of sight grows with the size: it does not make the target look
-// smaller.
-TEST(PoseSpace, NoiseAlongTheLineOfSightIsTheCamerasWhereTheSizeIsSolvedFor) {
+// What a camera errs by along the line of sight grows with the scale: it makes neither the target look
+// smaller nor the focal length shorter.
+TEST(PoseSpace, NoiseAlongTheLineOfSightIsTheCamerasWhereScalesAreSolvedFor) {
   constexpr int kTrials = 100;
-  double mean = 0, squares = 0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero(), squares = mean;
   for (unsigned trial = 0; trial < kTrials; ++trial) {
     const NoisyLoops noisy = noisy_loops(20, {.across = 0.2e-3, .along = 8e-3}, 600 + trial);
-    const double size = std::log(fit_pose_space(noisy.loops, shah(noisy.loops), SizeUnknown{}).size);
-    mean += size / kTrials;
-    squares += size * size / kTrials;
+    const Eigen::Vector2d logs =
+        fit_pose_space(noisy.loops, shah(noisy.loops),
+                       ScalesUnknown{.focal_length_sd = std::numeric_limits<double>::infinity()})
+            .scales.logs();
+    mean += logs / kTrials;
+    squares += logs.cwiseAbs2() / kTrials;
   }
-  EXPECT_LT(std::abs(mean), 3 * std::sqrt((squares - mean * mean) / kTrials));
+  for (Eigen::Index i = 0; i < 2; ++i)
+    EXPECT_LT(std::abs(mean[i]), 3 * std::sqrt((squares[i] - mean[i] * mean[i]) / kTrials)) << i;
+}
+
+// An unknown focal length widens what is stated of X, and no more than it has to.
+TEST(PoseSpace, AnUnknownFocalLengthIsStatedByItsErrors) {
+  constexpr int kTrials = 60;
+  double chi_square = 0, of_scale = 0;
+  for (unsigned trial = 0; trial < kTrials; ++trial) {
+    NoisyLoops noisy = noisy_loops(20, {}, 800 + trial);
+    const double truth = 1 + 0.01 * (static_cast<double>(trial % 5) - 2);
+    noisy.loops = rescaled(std::move(noisy.loops), {.focal_length = 1 / truth});
+    const PoseSpaceFit fit = fit_pose_space(
+        noisy.loops, shah(noisy.loops),
+        ScalesUnknown{.size_sd = 0, .focal_length_sd = std::numeric_limits<double>::infinity()});
+    const Vector6d error = motion_between(fit.poses.X, noisy.truth.X);
+    chi_square += error.dot(fit.covariance.topLeftCorner<6, 6>().ldlt().solve(error)) / kTrials;
+    of_scale += std::pow(std::log(fit.scales.focal_length / truth), 2) / fit.covariance(13, 13) / kTrials;
+    EXPECT_EQ(fit.covariance(12, 12), 0);
+  }
+  EXPECT_NEAR(chi_square, 6, 3 * std::sqrt(12.0 / kTrials));
+  EXPECT_NEAR(of_scale, 1, 3 * std::sqrt(2.0 / kTrials));
 }
 
 // Such poses are those of a target that turns about the camera. They have no line of sight.

@@ -37,6 +37,16 @@ TEST(LinearLoop, DerivativesAreThoseOfDifferences) {
       const Vector6d difference = (side(kStep) - side(-kStep)) / (2 * kStep);
       EXPECT_LT((linear.by_poses.col(k) - difference).norm(), 1e-7) << k;
     }
+    const auto seen = [&](double SeenScales::*scale, double step) {
+      SeenScales scales;
+      scales.*scale = std::exp(step);
+      return linear_loop(rescaled({loop}, scales).front(), poses).residual;
+    };
+    Eigen::Index column = 0;
+    for (double SeenScales::*scale : {&SeenScales::size, &SeenScales::focal_length}) {
+      const Vector6d difference = (seen(scale, kStep) - seen(scale, -kStep)) / (2 * kStep);
+      EXPECT_LT((linear.by_scales.col(column++) - difference).norm(), 1e-7);
+    }
   }
 }
 

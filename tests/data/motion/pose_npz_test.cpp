@@ -67,6 +67,22 @@ TEST(PairsOfNumpy, AreReadAsOpenCvTakesThem) {
                                                                   {"t_target2cam", {2, 3}, t}}))));
 }
 
+TEST(PairsOfNumpy, AreReadWithRotationVectors) {
+  const TemporaryFolder folder;
+  std::vector<double> vectors;
+  for (const double* matrix : {kFirst, kSecond}) {
+    Eigen::Matrix3d R;
+    for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = matrix[4 * (i / 3) + i % 3];
+    const Eigen::AngleAxisd turn(R);
+    for (const double value : Eigen::Vector3d(turn.angle() * turn.axis())) vectors.push_back(value);
+  }
+  const std::vector<double> t = both([](int row, int column) { return row < 3 && column == 3; });
+  expect_both(load_pose_pairs(folder.write("pairs.npz", npz_text({{"R_gripper2base", {2, 3}, vectors},
+                                                                  {"t_gripper2base", {2, 3}, t},
+                                                                  {"R_target2cam", {2, 3, 1}, vectors},
+                                                                  {"t_target2cam", {2, 3}, t}}))));
+}
+
 TEST(PosesOfNumpy, AreTheRobotsOrTheOnlyArray) {
   const TemporaryFolder folder;
   for (const char* name : {"T_base_ee", "arr_0"}) {

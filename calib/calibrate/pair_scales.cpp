@@ -1,0 +1,259 @@
+#include "calib/calibrate/pair_scales.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "calib/solve/convention_check.h"
+#include "calib/solve/lens_prior.h"
+#include "calib/uncertainty/split_check.h"
+#include "data/files/error.h"
+#include "data/numbers/chi_square.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr double kUsualSize = 0.01;    // standard deviation of what a size that is stated is off by
+constexpr double kUsualFocal = 0.005;  // of a focal length, as usual_lens_prior() has it
+constexpr double kUnknown = 0.1;       // a scale that is known to less is not told
+constexpr std::size_t kEnough = 8;     // pairs that tell their noise and a size together
+
+double focal_length_sd(const CalibrateSettings& settings) {
+  if (settings.use == Use::two_arms && settings.lens == LensKnowledge::near) return 0;  // as of pictures
+  switch (settings.lens) {
+    case LensKnowledge::stated:
+      return 0;
+    case LensKnowledge::near:
+      return kUsualFocal;
+    case LensKnowledge::unknown:
+      return std::numeric_limits<double>::infinity();
+  }
+  return kUsualFocal;
+}
+
+/// What pairs want, and the covariance of its logs.
+struct Wanted {
+  SeenScales scales;
+  Eigen::Matrix2d covariance;
+};
+
+/// With what the halves of the robot's places do not agree on, which none of them sees by itself, and with
+/// whose the noise is. None where the solution does not converge.
+std::optional<Wanted> wanted_scales(const std::vector<PoseLoop>& loops,
+                                    const std::vector<Observation>& observations, const HandEyePoses& seed,
+                                    const std::optional<AlongPrior>& along, const ScalesUnknown& known) {
+  const PoseSpaceFit fit = fit_pose_space(loops, seed, known, along);
+  if (!fit.converged) return std::nullopt;
+  Wanted wanted{fit.scales, fit.covariance.bottomRightCorner<2, 2>()};
+  if (loops.size() < kEnough) return wanted;
+  std::vector<Eigen::Vector3d> places;
+  for (const Observation& observation : observations)
+    places.push_back(observation.T_base_gripper.translation());
+  const auto add = [](const Eigen::Vector2d& apart, double share, Eigen::Matrix2d& sum) {
+    sum += 0.25 * share * apart * apart.transpose();
+  };
+  Eigen::Matrix2d apart = Eigen::Matrix2d::Zero();
+  constexpr Split kSplits[] = {Split::consecutive, Split::place_1, Split::place_2, Split::place_3};
+  for (const Split split : kSplits) {
+    const std::vector<int> half = halves_of(places, split);
+    std::vector<PoseLoop> parts[2];
+    for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
+    add(fit_pose_space(parts[0], fit.poses, known, along).scales.logs() -
+            fit_pose_space(parts[1], fit.poses, known, along).scales.logs(),
+        1.0 / static_cast<double>(std::size(kSplits)), apart);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> missing(apart - wanted.covariance);
+  wanted.covariance += missing.eigenvectors() * missing.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                       missing.eigenvectors().transpose();
+  const auto with_noise_of = [&](double camera_share) {
+    ScalesUnknown of = known;
+    of.camera_share = camera_share;
+    return fit_pose_space(loops, seed, of, along).scales.logs();
+  };
+  add(with_noise_of(1) - with_noise_of(0), 1, wanted.covariance);
+  return wanted;
+}
+
+/// A scale that is told by itself, of its logarithm's deviation.
+std::optional<TargetSize::Wanted> told(const std::optional<Wanted>& wanted, double SeenScales::*scale,
+                                       Eigen::Index i) {
+  const double sd = wanted ? std::sqrt(wanted->covariance(i, i)) : kUnknown;
+  if (!(sd < kUnknown)) return std::nullopt;
+  return TargetSize::Wanted{(*wanted).scales.*scale, (*wanted).scales.*scale * sd};
+}
+
+/// With one number known beforehand, about 0.
+void take_in(double prior_sd, Eigen::Index i, Eigen::Vector2d& logs, Eigen::Matrix2d& covariance) {
+  if (!std::isfinite(prior_sd)) return;
+  const Eigen::Vector2d gain = covariance.col(i) / (covariance(i, i) + prior_sd * prior_sd);
+  const Eigen::RowVector2d row = covariance.row(i);
+  logs -= gain * logs[i];
+  covariance -= gain * row;
+}
+
+/// Of the answer with other scales than those it is for.
+Vector6d camera_with(const Calibration& result, const std::vector<PoseLoop>& loops,
+                     const std::optional<AlongPrior>& along, const SeenScales& over) {
+  return motion_between(result.poses.X,
+                        fit_pose_space(rescaled(loops, over), result.poses, {}, along).poses.X);
+}
+
+bool excluded(const Calibration& result, const Vector6d& away) {
+  return away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_95_of_6;
+}
+
+void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,
+               const std::optional<AlongPrior>& along, const CalibrateSettings& settings) {
+  const TargetSize& size = *result.size;
+  if (!size.far_off()) return;
+  const Vector6d away = camera_with(result, loops, along, {.size = size.wanted->estimate / size.estimate}),
+                 as_stated = camera_with(result, loops, along, {.size = 1 / size.estimate});
+  const bool depends = excluded(result, away) || excluded(result, as_stated);
+  if (settings.size_as_stated) result.covariance += away * away.transpose();
+  const Vector6d& farther = as_stated.head<3>().norm() > away.head<3>().norm() ? as_stated : away;
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "the target is %.4g times as large as stated (+- %.2g, 2 sd), or the robot's translations are not "
+      "in metres: measure a square; the answer is for %.4g, and with the stated or the other size the camera "
+      "is up to "
+      "%.1f mm and %.2f deg from where it is here (--target-size solved takes the estimate)",
+      size.wanted->estimate, 2 * size.wanted->sd, size.estimate, 1e3 * farther.head<3>().norm(),
+      farther.tail<3>().norm() * 180 / M_PI);
+  tell_first(result, text, depends && !settings.size_as_stated);
+}
+
+void tell_focal_length(Calibration& result, const std::vector<PoseLoop>& loops,
+                       const std::optional<AlongPrior>& along) {
+  if (!result.focal_length || !result.focal_length->far_off()) return;
+  const TargetSize& focal = *result.focal_length;
+  const Vector6d away = camera_with(result, loops, along,
+                                    {.focal_length = focal.wanted->estimate / focal.estimate}),
+                 as_stated = camera_with(result, loops, along, {.focal_length = 1 / focal.estimate});
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "the camera's focal length is %.4g times (+- %.2g, 2 sd) that with which the target's poses were made: "
+      "calibrate the lens and make them anew, or give the pictures; the answer is for %.4g, and with the "
+      "stated focal length the camera is %.1f mm and %.2f deg from where it is here",
+      focal.wanted->estimate, 2 * focal.wanted->sd, focal.estimate, 1e3 * as_stated.head<3>().norm(),
+      as_stated.tail<3>().norm() * 180 / M_PI);
+  tell_first(result, text, excluded(result, away));
+}
+
+}  // namespace
+
+SeenScales PairScales::estimate() const { return {size.estimate, focal_length ? focal_length->estimate : 1}; }
+
+PairScales settle_scales(std::vector<PoseLoop>& loops, const std::vector<Observation>& observations,
+                         const HandEyePoses& seed, const std::optional<AlongPrior>& along,
+                         const CalibrateSettings& settings) {
+  PairScales scales{.size = {.prior_sd = settings.target_size_sd.value_or(kUsualSize)}};
+  TargetSize& size = scales.size;
+  // A tracker's poses are seen along no axis.
+  const double focal_sd = unseen_targets(observations).plainly() ? 0 : focal_length_sd(settings);
+  const double unknown = std::numeric_limits<double>::infinity();
+  const bool enough = loops.size() >= kEnough;
+  std::optional<Wanted> any_size;
+  if (enough) {
+    any_size =
+        wanted_scales(loops, observations, seed, along, {.size_sd = unknown, .focal_length_sd = focal_sd});
+    size.wanted = told(any_size, &SeenScales::size, 0);
+  }
+  if (std::isinf(size.prior_sd) && !size.wanted)
+    throw data::InputError(
+        "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
+        "out, or add views farther apart");
+  const bool solved = size.prior_sd > 0 && !settings.size_as_stated;
+  if (settings.size_as_stated && std::isfinite(size.prior_sd)) scales.kept_size_sd = size.prior_sd;
+  if (focal_sd > 0) {
+    TargetSize& focal = scales.focal_length.emplace(TargetSize{.prior_sd = focal_sd});
+    if (enough)
+      focal.wanted = told(
+          wanted_scales(loops, observations, seed, along, {.size_sd = unknown, .focal_length_sd = unknown}),
+          &SeenScales::focal_length, 1);
+    if (std::isinf(focal_sd) && !focal.wanted) scales.focal_length.reset();
+  }
+  if (!solved && !scales.focal_length) return scales;
+  // Of few pairs, and of those that do not tell a size, what is known weighs as much as they do. A size that
+  // is kept does not bend the focal length.
+  const bool by_pairs = size.wanted.has_value();
+  const std::optional<Wanted> found =
+      by_pairs
+          ? any_size
+          : wanted_scales(loops, observations, seed, along,
+                          {.size_sd = size.prior_sd, .focal_length_sd = scales.focal_length ? focal_sd : 0});
+  if (!found) return scales;
+  Eigen::Vector2d logs = found->scales.logs();
+  scales.covariance = found->covariance;
+  if (solved) {
+    if (by_pairs) take_in(size.prior_sd, 0, logs, scales.covariance);
+    size.estimate = std::exp(logs[0]);
+    size.sd = size.estimate * std::sqrt(scales.covariance(0, 0));
+    scales.information[0] = std::pow(size.prior_sd, -2);
+  } else {
+    scales.covariance.row(0).setZero();
+    scales.covariance.col(0).setZero();
+  }
+  if (scales.focal_length) {
+    scales.focal_length->estimate = std::exp(logs[1]);
+    scales.focal_length->sd = scales.focal_length->estimate * std::sqrt(scales.covariance(1, 1));
+    scales.information[1] = 1 / (focal_sd * focal_sd * (1 + std::pow(logs[1] / focal_sd, 2) / kLensTail));
+  }
+  scales.repeatable =
+      scales.covariance - scales.covariance * scales.information.asDiagonal() * scales.covariance;
+  loops = rescaled(std::move(loops), scales.estimate());
+  return scales;
+}
+
+Eigen::Matrix<double, 6, 2> camera_by_scales(const std::vector<PoseLoop>& loops, const HandEyePoses& poses,
+                                             const std::optional<AlongPrior>& along) {
+  constexpr double kStep = 1e-3;
+  const auto difference = [&](double SeenScales::*scale) -> Vector6d {
+    const auto with = [&](double value) {
+      SeenScales scales;
+      scales.*scale = value;
+      return fit_pose_space(rescaled(loops, scales), poses, {}, along).poses.X;
+    };
+    return motion_between(with(1 - kStep), with(1 + kStep)) / (2 * kStep);
+  };
+  Eigen::Matrix<double, 6, 2> by_scales;
+  by_scales << difference(&SeenScales::size), difference(&SeenScales::focal_length);
+  return by_scales;
+}
+
+void tell_scales(Calibration& result, const std::vector<PoseLoop>& loops,
+                 const std::optional<AlongPrior>& along, const CalibrateSettings& settings) {
+  tell_focal_length(result, loops, along);
+  tell_size(result, loops, along, settings);
+}
+
+void tell_size_of_few(Calibration& result, const std::vector<Observation>& all,
+                      const CalibrateSettings& settings) {
+  if (result.size->wanted) return;
+  ConventionSettings any = settings.convention;
+  any.suspicious = 0;  // a size that is off by a fifth still closes well
+  const auto sized = check_size(result.setup, all, {Symmetry{}}, result.selection.robust_seed, any);
+  if (sized) tell_first(result, sized->sentence, !settings.size_as_stated);
+}
+
+bool Unseen::plainly() const {
+  constexpr std::size_t kFew = 10;  // one in so many may be an outlier
+  return kFew * count > of;
+}
+
+Unseen unseen_targets(const std::vector<Observation>& observations) {
+  constexpr double kSteepest = 3.7;  // tangent of 75 deg
+  Unseen unseen;
+  for (const Observation& observation : observations) {
+    if (observation.T_camera_target.empty()) continue;
+    const Eigen::Vector3d t = observation.T_camera_target.front().translation();
+    ++unseen.of;
+    unseen.count += t.z() > 0 && t.head<2>().norm() < kSteepest * t.z() ? 0 : 1;
+  }
+  return unseen;
+}
+
+}  // namespace flash::calib
