@@ -17,7 +17,8 @@ PoseList load_npy_poses(const std::string& path);
 /// hand, T_base_gripper, T_base_ee) and of the target in the camera (target, tracking, object, board, marker,
 /// T_camera_target, T_cam_board), each N x 4 x 4, N x 3 x 4 or N x 7 (x y z qx qy qz qw). Or as
 /// calibrateHandEye of OpenCV takes them: R_gripper2base and R_target2cam, N x 3 x 3 or rotation vectors, N x
-/// 3, t_gripper2base and t_target2cam, N x 3. Capitals and underscores do not count. Throws InputError that names the arrays found.
+/// 3, t_gripper2base and t_target2cam, N x 3. Capitals and underscores do not count. Throws InputError that
+/// names the arrays found.
 std::vector<PosePair> load_npz_pairs(const std::string& path);
 
 }  // namespace flash::data
