@@ -11,11 +11,9 @@
 #include "data/files/error.h"
 #include "data/machine/parallel.h"
 #include "sim/cuda/phase_clock.h"
-#include "sim/cuda/projective_phases.h"
 #include "sim/device_error.h"
 #include "sim/device_shares.h"
 #include "sim/environment_checks.h"
-#include "sim/projective_batch.h"
 #include "sim/step/resultants.h"
 #include "sim/worlds.h"
 #include "sim/zeroed_numbers.h"
@@ -158,6 +156,7 @@ struct Batch::Storage {
     share.worlds.emplace(
         plan, std::move(own),
         WorldSettings{.solver = settings.solver,
+                      .projective = settings.projective,
                       .first_step = before,
                       .threads = settings.threads,
                       .device = Device::cuda,
@@ -224,33 +223,13 @@ struct Batch::Storage {
     failures.throw_any();
   }
 
-  /// The same by the projective method.
-  void advance_projective(int before, int steps_further, const std::function<void(int)>& finished) {
-    DeviceResults results;
-    results.stepped = [&](const DeviceSteps& taken) {
-      const std::ptrdiff_t place = taken.environment * steps() + taken.first - settings.first_step;
-      std::copy(taken.stats.begin(), taken.stats.end(), stats.begin() + place);
-      std::copy(taken.hold_forces.begin(), taken.hold_forces.end(), hold_forces.begin() + 3 * place * holds);
-    };
-    results.kept_at = [&](int e, int index) { return kept_at(e, index); };
-    results.timed = [&](std::span<const double> ticks) { add_ticks(ticks); };
-    results.finished = [&](int e) {
-      show(e);
-      if (finished) finished(e);
-    };
-    sim::advance_projective(plan, environments, settings, before, steps_further, results);
-  }
-
   void advance_on_device(int before, int steps_further, const std::function<void(int)>& finished) {
     if (settings.solver.stop != nullptr && *settings.solver.stop) throw data::Stopped();
     if (settings.contacts)
       throw data::InputError(
           "--device cuda: forces of each contact and resultants of bodies (contacts) are told on the CPU "
           "alone");
-    if (settings.projective)
-      advance_projective(before, steps_further, finished);
-    else
-      advance_on_devices(before, steps_further, finished);
+    advance_on_devices(before, steps_further, finished);
   }
 };
 
@@ -393,10 +372,9 @@ View<double> Batch::obstacle_resultants() const {
 std::vector<PhaseShare> Batch::phases() const {
   const std::vector<double>& ticks = storage_->phase_ticks;
   const double all = std::accumulate(ticks.begin(), ticks.end(), 0.0);
-  const char* const* names =
-      storage_->settings.projective ? cuda::projective_phase_names : cuda::replay_phase_names;
   std::vector<PhaseShare> shares;
-  for (std::size_t k = 0; k < ticks.size(); ++k) shares.push_back({names[k], ticks[k] / all});
+  for (std::size_t k = 0; k < ticks.size(); ++k)
+    shares.push_back({cuda::replay_phase_names[k], ticks[k] / all});
   return shares;
 }
 

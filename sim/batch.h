@@ -42,9 +42,8 @@ struct PhaseShare {
 struct BatchSettings {
   SolverSettings solver{};
   /// The projective method in place of Newton's, with the time step of its own; of `solver` only `stop`
-  /// holds.
+  /// holds. On the CPU alone.
   std::optional<ProjectiveSettings> projective{};
-  bool half_factor = false;       ///< of the projective method on a device: its factor in half precision
   int steps = 0;                  ///< last step of the whole replay
   std::vector<int> kept_steps{};  ///< steps whose positions are kept, ascending; step 0 is the start
   bool contacts = false;          ///< whether contacts and resultants are kept; on the CPU alone
@@ -57,7 +56,7 @@ struct BatchSettings {
 /// Many environments over one plan, each with its own material, for a whole replay: a loop over Worlds.
 /// Environment e of a batch equals the same environment alone, bitwise, on any number of threads and devices
 /// and however often it advances. Where a device has no room for all at once that holds where it advances by
-/// multiples of restart_interval, as for the projective method there.
+/// multiples of restart_interval.
 class Batch {
  public:
   /// Throws as Worlds does, and std::invalid_argument where the steps do not ascend from first_step to
@@ -79,7 +78,7 @@ class Batch {
   /// finished. A batch that has thrown cannot advance any more.
   void advance(int steps, const std::function<void(int)>& finished = {});
 
-  /// Whether and why an environment is lost, as Worlds says. By the projective method none is on a device.
+  /// Whether and why an environment is lost, as Worlds says.
   Lost lost(int environment) const;
   std::string why_lost(int environment) const;
 

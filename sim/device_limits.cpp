@@ -32,19 +32,9 @@ std::string why_not_on_device(const Environment& environment) {
   return {};
 }
 
-std::string why_not_on_device(const ProjectiveSettings& settings) {
-  if (settings.acceleration != 0)
-    return "the projective method runs without acceleration there: found a depth of " +
-           std::to_string(settings.acceleration) + ", expected 0";
-  if (settings.metric != ContactMetric::inertia)
-    return "the projective method has the inertia metric there (LiteNonSmoothNewton); full and automatic are "
-           "met on the CPU alone";
-  return {};
-}
-
 void check_on_device(const std::vector<Environment>& environments, const WorldSettings& settings) {
   if (settings.projective)
-    throw data::InputError("--device cuda: the projective method steps worlds on the CPU alone");
+    throw data::InputError("--device cuda: the projective method runs on the CPU alone");
   if (environments.empty())
     throw data::InputError("--device cuda: found no environments, expected one or more");
   for (std::size_t e = 0; e < environments.size(); ++e)

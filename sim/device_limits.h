@@ -2,7 +2,6 @@
 #include <string>
 #include <vector>
 
-#include "sim/oracle/projective.h"
 #include "sim/scene/environment.h"
 #include "sim/world.h"
 
@@ -10,9 +9,6 @@ namespace flash::sim {
 
 /// What a CUDA device cannot do yet of an environment, in a line; empty where it can all of it.
 std::string why_not_on_device(const Environment& environment);
-
-/// The same of the projective method's settings.
-std::string why_not_on_device(const ProjectiveSettings& settings);
 
 /// Throws data::InputError where worlds cannot live on a device, and names the environment where there are
 /// several.

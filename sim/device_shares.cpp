@@ -13,10 +13,6 @@ void DeviceFailures::add(const std::string& why, const std::vector<int>& environ
   environments_.insert(environments_.end(), environments.begin(), environments.end());
 }
 
-bool DeviceFailures::has(int environment) const {
-  return std::find(environments_.begin(), environments_.end(), environment) != environments_.end();
-}
-
 void DeviceFailures::throw_any() const {
   if (!environments_.empty())
     throw DeviceError(why_, std::vector<std::size_t>(environments_.begin(), environments_.end()));

@@ -11,7 +11,6 @@ namespace flash::sim {
 class DeviceFailures {
  public:
   void add(const std::string& why, const std::vector<int>& environments);
-  bool has(int environment) const;
   /// Throws a DeviceError where there are any.
   void throw_any() const;
 

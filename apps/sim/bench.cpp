@@ -130,6 +130,9 @@ int bench(BenchOptions options) {
   if (benchmark.threads == 0) benchmark.threads = int(std::max(1u, std::thread::hardware_concurrency()));
   for (const sim::InstructionLevel level : sim::instruction_levels())
     if (sim::to_string(level) == options.level) benchmark.level = level;
+  if (options.method == "projective" && options.device != "auto" && options.device != "cpu")
+    throw data::InputError("--device: found \"" + options.device +
+                           "\", expected auto or cpu: --method projective runs on the CPU alone");
   const sim::DeviceChoice choice = sim::choose_device(options.device == "auto" ? "cpu" : options.device);
   benchmark.device = choice.device;
   benchmark.cuda_devices = choice.cuda_devices;
@@ -187,7 +190,7 @@ void add_bench_verb(CLI::App& app, Action& action) {
       "Examples:\n"
       "  flash-sim bench --vertices 1000 --envs 64 --steps 250 --threads 2\n"
       "  flash-sim bench --vertices 1000,2000,4000 --envs 1,64,256,1024 --device cuda\n"
-      "  flash-sim bench --vertices 1000 --envs 64 --method projective --device cuda");
+      "  flash-sim bench --vertices 1000 --envs 64 --method projective");
   const auto positive = [&](const char* name, double& value, const char* text) {
     verb.add_option(name, value, text)->check(positive_number())->capture_default_str();
   };
@@ -222,7 +225,7 @@ void add_bench_verb(CLI::App& app, Action& action) {
                   "Where the simulation runs: cpu, cuda, cuda:1, cuda:0,2 or cuda:all; auto: the CPU")
       ->capture_default_str();
   verb.add_option("--method", options->method,
-                  "newton, to the tolerance; projective: the published budget, which does not converge")
+                  "newton, to the tolerance; projective: the published budget, on the CPU, without convergence")
       ->check(CLI::IsMember({"newton", "projective"}))
       ->capture_default_str();
   verb.add_flag("--json", options->json, "Print the result as JSON");

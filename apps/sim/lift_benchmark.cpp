@@ -11,10 +11,8 @@
 #include "data/numbers/worst.h"
 #include "sim/batch.h"
 #include "sim/cpu/block_cholesky.h"
-#include "sim/cuda/layout/inverse_tree.h"
 #include "sim/cuda/layout/step_cost.h"
 #include "sim/cuda/most_vertices.h"
-#include "sim/oracle/projective_system.h"
 #include "sim/step/elastic_energy.h"
 
 namespace flash::sim {
@@ -170,7 +168,6 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   settings.solver.tolerance = benchmark.tolerance;
   settings.solver.stop = &stop;
   if (benchmark.projective) settings.projective = published_budget(benchmark);
-  settings.half_factor = benchmark.projective;
   settings.steps = benchmark.steps;
   settings.kept_steps = {benchmark.steps / 2};
   settings.threads = benchmark.threads;
@@ -234,17 +231,6 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   result.slowest_bending_rigidity = slowest_material.bending_rigidity;
   if (benchmark.device == Device::cuda) {
     result.step_milliseconds = 1e3 * result.wall_seconds * environments_together(benchmark) / total;
-    if (benchmark.projective) {
-      // Of the factor, which each solve reads: two an iteration, and one for the report.
-      const ProjectiveMatrix matrix =
-          projective_matrix(*plan, {lift_material(benchmark, 0)}, benchmark.time_step);
-      const cuda::InverseTree tree =
-          cuda::plan_inverse(cuda::pattern_of(matrix.matrix), plan->sheet.rest.vertices);
-      const double solves = 2 * result.iterations + 1;
-      result.least_bytes = solves * 2 * cuda::inverse_tile_numbers * tree.tiles;
-      result.least_flops = solves * 6 * cuda::inverse_tile_numbers * static_cast<double>(tree.products);
-      return result;
-    }
     const cuda::FrontPlan fronts = cuda::plan_fronts(plan->pattern, plan->sheet.rest.vertices);
     const cuda::SheetLayout layout =
         cuda::lay_out(*plan, bending_operator(*plan, lift_material(benchmark, 0)), fronts);

@@ -21,7 +21,8 @@ struct LiftBenchmark {
   Device device = Device::cpu;
   std::vector<int> cuda_devices{};  ///< as in BatchSettings
   /// The published method on its fixed budget, in place of Newton's: five local-global iterations, up to ten
-  /// of contact with the inertia metric, isometric bending. `tolerance` ends a step earlier.
+  /// of contact with the inertia metric, isometric bending. `tolerance` ends a step earlier. On the CPU
+  /// alone.
   bool projective = false;
   double time_step = 0.01;                                           ///< [s]
   double tolerance = 1e-3;                                           ///< on |r| / |M g|

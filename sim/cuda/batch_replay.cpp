@@ -48,7 +48,6 @@ BatchReplay::BatchReplay(std::shared_ptr<const SheetPlan> plan,
   ReplayMemory& m = replay_->memory;
   m.open(whole(environments, settings, m.front_plan.position));
   m.keep_start(environments);
-  if (settings.projective) m.use_projective_method(*plan, environments);
 }
 BatchReplay::~BatchReplay() = default;
 BatchReplay::BatchReplay(BatchReplay&&) noexcept = default;

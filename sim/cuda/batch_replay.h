@@ -4,16 +4,13 @@
 #include <atomic>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "data/asset/material.h"
 #include "data/mesh/mesh.h"
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/layout/front_plan.h"
-#include "sim/cuda/layout/inverse_layout.h"
 #include "sim/newton/restart_interval.h"
-#include "sim/oracle/projective.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 
@@ -87,12 +84,6 @@ struct ReplaySettings {
   double lost_residual = std::numeric_limits<double>::infinity();
   int team_blocks = 0;  ///< processors that work on an environment, 1, 2, 4 or 8; 0: team_stages has it
   FrontSettings fronts{};
-
-  /// The projective method in place of Newton's; its time step and tolerance are those above. Without
-  /// acceleration and with the inertia metric; the same vertices are held in all steps, in all axes.
-  std::optional<ProjectiveSettings> projective{};
-  InversePrecision precision = InversePrecision::single;  ///< of its constant factor
-  int threads = 1;                                        ///< of the processor, which factorize
 };
 
 /// How one step of one environment went, as in StepReport.
@@ -114,8 +105,7 @@ struct ReplayMemory;
 class BatchReplay {
  public:
   /// Throws std::invalid_argument where environments do not fit the plan, miss holds or springs for a step,
-  /// have more than most_obstacles, or, with the projective method, have springs or not the same bending
-  /// operator; std::runtime_error with the device's message.
+  /// or have more than most_obstacles; std::runtime_error with the device's message.
   BatchReplay(std::shared_ptr<const SheetPlan> plan, const std::vector<ReplayEnvironment>& environments,
               ReplaySettings settings);
   ~BatchReplay();

@@ -111,20 +111,6 @@ __device__ void put_in_all(Number* on_chip, const Number& value) {
       for (int k = half; k < 2 * half; ++k) *in_block(on_chip, block_of_team() ^ k) = value;
 }
 
-/// Where a team keeps what all of its threads read and write: on chip of its only block, in a copy on chip of
-/// each block, or once in the device's memory.
-enum class Keeping { one_block, each_block, memory };
-
-/// Writes a number for the whole team: to `on_chip` of this block and those others that keep a copy, or to
-/// memory.
-template <Keeping keeping, typename Number>
-__device__ void put(Number* to, const Number& value) {
-  if constexpr (keeping == Keeping::each_block)
-    put_in_all(to, value);
-  else
-    *to = value;
-}
-
 /// Takes numbers that no other thread gets, from what `counter` was on.
 __device__ inline int take_numbers(int& counter, int count) { return atomicAdd(&counter, count); }
 

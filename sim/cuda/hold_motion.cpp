@@ -82,15 +82,6 @@ int steps_before_a_hold_closes(const Environment& environment, double time_step,
   return most;
 }
 
-int steps_before_a_hold_changes(const Environment& environment, double time_step, int most) {
-  double time = environment.state.time;
-  for (int k = 0; k < most; ++k, time += time_step)
-    for (const Hold& hold : environment.holds)
-      if (k > 0 && is_closed(hold, time, time + time_step) != is_closed(hold, time - time_step, time))
-        return k;
-  return most;
-}
-
 bool closes_next(const Environment& environment, double time_step) {
   const double time = environment.state.time;
   const std::vector<HeldVertices>& held = environment.state.held;

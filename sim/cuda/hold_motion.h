@@ -8,9 +8,6 @@ namespace flash::sim::cuda {
 /// before another hold closes. It takes vertices from where they are then.
 int steps_before_a_hold_closes(const Environment& environment, double time_step, int most);
 
-/// How many of the next `most` steps have the same holds closed.
-int steps_before_a_hold_changes(const Environment& environment, double time_step, int most);
-
 /// Whether a hold closes in the next step of `time_step` [s]: it takes vertices from where they are.
 bool closes_next(const Environment& environment, double time_step);
 

@@ -19,7 +19,6 @@ void check_springs(const ReplayEnvironment& environment, const ReplaySettings& s
   if (environment.springs == nullptr) return;
   require(std::ssize(*environment.springs) >= settings.steps - settings.first_step,
           "springs have to be given for each step");
-  require(!settings.projective, "the projective method knows no springs");
   const auto is_there = [](int number, std::ptrdiff_t count) { return number >= 0 && number < count; };
   for (const std::vector<SpringMotion>& step : *environment.springs)
     for (const SpringMotion& spring : step) {
@@ -42,7 +41,7 @@ void check_replay(const SheetPlan& plan, const std::vector<ReplayEnvironment>& e
   require(settings.first_step >= 0 && settings.steps >= settings.first_step,
           "the steps have to ascend from first_step to steps");
   require(!environments.empty(), "no environments");
-  require(settings.restart_interval >= (settings.projective ? 1 : 0), "restart_interval has to be positive");
+  require(settings.restart_interval >= 0, "restart_interval has to be positive");
   require(settings.team_blocks >= 0 && settings.team_blocks <= most_team_blocks &&
               (settings.team_blocks & (settings.team_blocks - 1)) == 0,
           "team_blocks have to be 0, 1, 2, 4 or 8");
@@ -55,9 +54,6 @@ void check_replay(const SheetPlan& plan, const std::vector<ReplayEnvironment>& e
           "kept_steps have to lie between first_step and steps");
   const int size = plan.pattern.size;
   for (const ReplayEnvironment& e : environments) {
-    require(!settings.projective ||
-                &bending_operator(plan, e.material) == &bending_operator(plan, environments.front().material),
-            "with the projective method all environments need the same bending operator");
     require(e.positions.rows() == size && e.velocities.rows() == size,
             "every environment needs a position and a velocity for each vertex");
     require(e.bristles.rows() == 0 || e.bristles.rows() == size * std::ssize(e.obstacles),

@@ -36,9 +36,9 @@ ReplayMemory::ReplayMemory(std::shared_ptr<const SheetPlan> sheet,
       sheet_(std::move(sheet)),
       bendings_(environments.size()),
       plan_bending_(&bending_operator(*sheet_, environments.front().material)) {
-  if (!settings.projective) plan_teams();
+  plan_teams();
   upload(environments);
-  if (!settings.projective) lay_out_teams();
+  lay_out_teams();
   set_numbers(environments.front());
   check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
 }
@@ -60,18 +60,6 @@ void ReplayMemory::wait(const std::atomic<bool>* asked) const {
     if (Clock::now() - begin > pause) std::this_thread::sleep_for(pause);
   if (asked != nullptr && *asked) *stop = 1;
   check(cudaStreamSynchronize(stream));
-}
-
-void ReplayMemory::use_projective_method(const SheetPlan& sheet,
-                                         const std::vector<ReplayEnvironment>& environments) {
-  const bool damped = std::any_of(environments.begin(), environments.end(),
-                                  [](const auto& e) { return e.material.stiffness_damping != 0; });
-  projection = std::make_unique<ProjectiveReplay>(
-      ProjectiveSizes{sheet, layout, front_plan.position, damped, most_obstacles_each}, environments,
-      settings, numbers);
-  teams = projection->teams();
-  team_blocks = projection->team_blocks();
-  require(teams > 0, "the sheet is too large for the device");
 }
 
 void ReplayMemory::set_numbers(const ReplayEnvironment& first) {
@@ -128,9 +116,8 @@ void ReplayMemory::upload(const std::vector<ReplayEnvironment>& environments) {
   obstacles = DeviceArray<PlacedObstacle>(placed);
   sheets = DeviceArray<SheetTables>(own_sheets);
   solvers = DeviceArray<SolverState>(std::vector<SolverState>(environments.size(), no_solver));
-  if (!settings.projective)
-    factors = DeviceArray<__half>(environments.size() * solve_tile_numbers *
-                                  static_cast<std::size_t>(plan.fronts.factor_tiles));
+  factors = DeviceArray<__half>(environments.size() * solve_tile_numbers *
+                                static_cast<std::size_t>(plan.fronts.factor_tiles));
   for (std::size_t e = 0; e < environments.size(); ++e) {
     write_loads(environments[e], e);
     write_stiffness(environments[e].stiffness, e);
@@ -331,7 +318,6 @@ void ReplayMemory::go_on(int begin, int end) {
 }
 
 void ReplayMemory::launch_steps(int environments, int steps) {
-  if (projection) return projection->run(stream);
   for (const TeamStage& stage : stages_for(environments, steps)) {
     ReplayNumbers own = numbers;
     own.fronts = fronts_.at(stage.blocks);
@@ -343,7 +329,6 @@ void ReplayMemory::launch_steps(int environments, int steps) {
 
 std::vector<double> ReplayMemory::phase_ticks() const {
   wait();
-  if (projection) return projection->phase_ticks();
   std::vector<double> ticks(replay_phases, 0.0);
   for (const TeamMemory& team : team_memory.read(0, team_memory.size())) {
     long long clocks[replay_phases];

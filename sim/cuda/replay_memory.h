@@ -12,7 +12,6 @@
 #include "sim/cuda/device_plan.h"
 #include "sim/cuda/devices.h"
 #include "sim/cuda/layout/team_stages.h"
-#include "sim/cuda/projective_replay.h"
 #include "sim/cuda/replay_numbers.h"
 #include "sim/cuda/step_tables.h"
 #include "sim/cuda/team_memory.h"
@@ -44,8 +43,7 @@ struct ReplayMemory {
   DeviceArray<TeamMemory> team_memory;
   int teams = 0, team_blocks = 1;  ///< at first
   ReplayNumbers numbers{};
-  StepTables tables;                             ///< of the steps at hand
-  std::unique_ptr<ProjectiveReplay> projection;  ///< of the projective method
+  StepTables tables;  ///< of the steps at hand
 
   /// Environments as they stand, without their motions.
   ReplayMemory(std::shared_ptr<const SheetPlan> sheet, const std::vector<ReplayEnvironment>& environments,
@@ -58,9 +56,6 @@ struct ReplayMemory {
   /// For what is queued; whoever comes next on this thread works with the device. Once `stop` is set the
   /// device ends after the steps that its teams are at, and the results are of no use.
   void wait(const std::atomic<bool>* stop = nullptr) const;
-
-  /// The projective method takes the steps from now on. All environments have the same bending operator.
-  void use_projective_method(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments);
 
   // Once what was queued has ended:
 

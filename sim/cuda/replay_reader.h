@@ -16,7 +16,6 @@ struct ReplayState {
 /// each: it has memory that the device writes to by itself, and waits once an environment.
 class ReplayReader {
  public:
-  explicit ReplayReader(const BatchReplay& replay) : ReplayReader(replay.memory()) {}
   explicit ReplayReader(const ReplayMemory& replay) : replay_(replay) {}
 
   ReplayState read_state(int environment);
@@ -35,7 +34,6 @@ class ReplayReader {
 /// Readers of a replay that no thread uses at the moment.
 class IdleReaders {
  public:
-  explicit IdleReaders(const BatchReplay& replay) : IdleReaders(replay.memory()) {}
   explicit IdleReaders(const ReplayMemory& replay) : replay_(replay) {}
 
   std::unique_ptr<ReplayReader> take();

@@ -44,14 +44,6 @@ FLASH_HOST_DEVICE inline ContactRows<Real> contact_rows(const ContactRowKind& ki
   return at;
 }
 
-/// Tangential components from the contact's basis into the frame of its rows (direction 1) or back (-1).
-template <typename Real>
-FLASH_HOST_DEVICE inline void turn_tangents(const ContactRows<Real>& at, int direction, Real tangents[2]) {
-  const Real c = at.cosine, s = direction * at.sine, first = tangents[0], second = tangents[1];
-  tangents[0] = c * first + s * second;
-  tangents[1] = c * second - s * first;
-}
-
 /// A sliding contact follows its normal force to the new rim of the disc, which the frozen one has missed.
 template <typename Real>
 FLASH_HOST_DEVICE inline void follow_rim(const ContactRows<Real>& at, Real friction, Real multiplier[3]) {
@@ -82,14 +74,6 @@ FLASH_HOST_DEVICE inline ContactViolation<Real> contact_violation(const Real gap
   const Real r = Real(0.5) * h * h * (diagonal[1] + diagonal[2]);
   return {normal_violation(gap[0], multiplier[0], h * h * diagonal[0]),
           friction_violation(gap + 1, multiplier + 1, multiplier[0], friction, r)};
-}
-
-/// The change of a row's multiplier where nothing else acts on it: of (Omega W + E) dlambda = rhs / h^2.
-template <typename Real>
-FLASH_HOST_DEVICE inline Real lone_change(const ConstraintRow<Real>& row, Real diagonal, Real h) {
-  constexpr Real least = 1e-14;
-  if (row.omega > least) return row.rhs / (h * h) / (row.omega * diagonal + row.compliance);
-  return row.compliance > 0 ? row.rhs / (h * h * row.compliance) : 0;
 }
 
 }  // namespace flash::sim

@@ -243,6 +243,8 @@ def check_device(options, folder):
     for device in ("cuda", "cuda:0", "gpu"):
         yield from refused(options, folder, [options.sysid, "plan", "recording", "--asset", "asset.json", "-o", "out", "--device", device],
                            f'--device: found "{device}"', "auto or cpu", "on the CPU alone")
+    yield from refused(options, folder, [options.sim, "bench", "--method", "projective", "--device", "cuda"],
+                       '--device: found "cuda"', "auto or cpu", "--method projective runs on the CPU alone")
     # Without a device, whatever the machine has.
     hidden = dict(os.environ, CUDA_VISIBLE_DEVICES="")
     for words in (["bench"], ["run", "short.json", "-o", "out"]):

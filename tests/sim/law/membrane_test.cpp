@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "data/files/error.h"
-#include "sim/law/membrane_stress.h"
 #include "sim/scene/sheet.h"
 #include "tests/sim/reference_scene.h"
 
@@ -95,44 +94,6 @@ double energy_by_svd(Constitutive model, const Matrix32& F) {
 
 Eigen::Matrix<double, 6, 1> flat(const Matrix32& F) {
   return Eigen::Map<const Eigen::Matrix<double, 6, 1>>(F.data());
-}
-
-TEST(MembraneStress, InClosedFormIsThatOfTheSingularValues) {
-  std::mt19937 rng(11);
-  std::uniform_real_distribution<double> stretch(0.02, 1.8);
-  for (const Constitutive model : models)
-    for (int trial = 0; trial < 200; ++trial) {
-      const Matrix32 F = random_gradient(rng, stretch(rng), stretch(rng));
-      const Matrix32 expected = membrane_stress(model, F, lame);
-      const Membrane membrane = membrane_of(model, lame);
-      const auto closed = [&]<typename Number>(Number) {
-        const auto column = [&](int k) {
-          return Vector3<Number>{static_cast<Number>(F(0, k)), static_cast<Number>(F(1, k)),
-                                 static_cast<Number>(F(2, k))};
-        };
-        Vector3<Number> p1, p2;
-        sim::membrane_stress(membrane.law, static_cast<Number>(membrane.lame.mu),
-                             static_cast<Number>(membrane.lame.lambda), column(0), column(1), p1, p2);
-        Matrix32 P;
-        for (int row = 0; row < 3; ++row) {
-          P(row, 0) = p1[row];
-          P(row, 1) = p2[row];
-        }
-        return P;
-      };
-      // Terms of the size of the moduli, and of the pressure of a small area, cancel.
-      const double largest = std::max(lame.mu + lame.lambda, expected.norm());
-      EXPECT_LE((closed(double{}) - expected).norm(), 1e-12 * largest);
-      EXPECT_LE((closed(float{}) - expected).norm(), 1e-5 * largest);
-    }
-}
-
-TEST(MembraneStress, OfATriangleThatIsALineIsFinite) {
-  for (const MembraneLaw law : {MembraneLaw::corotated, MembraneLaw::saint_venant_kirchhoff}) {
-    Vector3<float> p1, p2;
-    sim::membrane_stress(law, 10.0f, 5.0f, Vector3<float>{1, 0, 0}, Vector3<float>{0.5f, 0, 0}, p1, p2);
-    EXPECT_TRUE(std::isfinite(p1.x) && std::isfinite(p2.x));
-  }
 }
 
 TEST(Membrane, LameParametersOfPlaneStress) {
