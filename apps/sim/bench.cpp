@@ -225,7 +225,7 @@ void add_bench_verb(CLI::App& app, Action& action) {
                   "Where the simulation runs: cpu, cuda, cuda:1, cuda:0,2 or cuda:all; auto: the CPU")
       ->capture_default_str();
   verb.add_option("--method", options->method,
-                  "newton, to the tolerance; projective: the published budget, on the CPU, without convergence")
+                  "newton, to the tolerance; projective: the published budget, unconverged, on the CPU")
       ->check(CLI::IsMember({"newton", "projective"}))
       ->capture_default_str();
   verb.add_flag("--json", options->json, "Print the result as JSON");
