@@ -12,29 +12,26 @@ struct ContactRowKind {
 };
 
 /// The rows of a contact, tangential ones in the frame (cosine, sine) of their own.
-template <typename Real>
 struct ContactRows {
-  ConstraintRow<Real> rows[3];
-  Real cosine = 1, sine = 0;
+  ConstraintRow rows[3];
+  double cosine = 1, sine = 0;
   bool slides = false;
 };
 
 /// diagonal: W_ii [1/kg]; h: time step [s].
-template <typename Real>
-FLASH_HOST_DEVICE inline ContactRows<Real> contact_rows(const ContactRowKind& kind, const Real gap[3],
-                                                        const Real multiplier[3], Real friction,
-                                                        const Real diagonal[3], Real h) {
-  const Real r = h * h * diagonal[0], tangential = Real(0.5) * (diagonal[1] + diagonal[2]);
-  ContactRows<Real> at;
+inline ContactRows contact_rows(const ContactRowKind& kind, const double gap[3], const double multiplier[3],
+                                double friction, const double diagonal[3], double h) {
+  const double r = h * h * diagonal[0], tangential = 0.5 * (diagonal[1] + diagonal[2]);
+  ContactRows at;
   at.rows[0] = kind.fischer_burmeister ? normal_row_fischer_burmeister(gap[0], gap[0], multiplier[0], r, h)
                                        : normal_row_minimum_map(gap[0], gap[0], multiplier[0], r, h);
   if (kind.fixed_point) {
-    const FrictionRows<Real> t =
+    const FrictionRows t =
         friction_rows(gap + 1, gap + 1, multiplier + 1, multiplier[0], friction, h * tangential, h);
     for (int k = 0; k < 2; ++k) at.rows[1 + k] = {t.omega, t.compliance, t.rhs[k]};
     return at;
   }
-  const SlipRows<Real> t =
+  const SlipRows t =
       slip_rows(gap + 1, gap + 1, multiplier + 1, multiplier[0], friction, h * h * tangential, h);
   at.rows[1] = t.along;
   at.rows[2] = t.across;
@@ -45,33 +42,28 @@ FLASH_HOST_DEVICE inline ContactRows<Real> contact_rows(const ContactRowKind& ki
 }
 
 /// A sliding contact follows its normal force to the new rim of the disc, which the frozen one has missed.
-template <typename Real>
-FLASH_HOST_DEVICE inline void follow_rim(const ContactRows<Real>& at, Real friction, Real multiplier[3]) {
+inline void follow_rim(const ContactRows& at, double friction, double multiplier[3]) {
   if (!at.slides) return;
-  const Real size = std::sqrt(multiplier[1] * multiplier[1] + multiplier[2] * multiplier[2]);
+  const double size = std::sqrt(multiplier[1] * multiplier[1] + multiplier[2] * multiplier[2]);
   if (!(size > 0)) return;
-  const Real scale = friction * (multiplier[0] > 0 ? multiplier[0] : 0) / size;
+  const double scale = friction * (multiplier[0] > 0 ? multiplier[0] : 0) / size;
   multiplier[1] *= scale;
   multiplier[2] *= scale;
 }
 
 /// To 0 <= lambda_n <= max_force and |lambda_t| <= mu lambda_n.
-template <typename Real>
-FLASH_HOST_DEVICE inline void project_multiplier(Real max_force, Real friction, Real multiplier[3]) {
-  multiplier[0] = std::fmin(std::fmax(multiplier[0], Real(0)), max_force);
+inline void project_multiplier(double max_force, double friction, double multiplier[3]) {
+  multiplier[0] = std::fmin(std::fmax(multiplier[0], 0.0), max_force);
   project_on_disc(multiplier + 1, multiplier[0], friction);
 }
 
 /// What is left of Signorini's and of Coulomb's law [m].
-template <typename Real>
 struct ContactViolation {
-  Real normal, tangential;
+  double normal, tangential;
 };
-template <typename Real>
-FLASH_HOST_DEVICE inline ContactViolation<Real> contact_violation(const Real gap[3], const Real multiplier[3],
-                                                                  Real friction, const Real diagonal[3],
-                                                                  Real h) {
-  const Real r = Real(0.5) * h * h * (diagonal[1] + diagonal[2]);
+inline ContactViolation contact_violation(const double gap[3], const double multiplier[3], double friction,
+                                          const double diagonal[3], double h) {
+  const double r = 0.5 * h * h * (diagonal[1] + diagonal[2]);
   return {normal_violation(gap[0], multiplier[0], h * h * diagonal[0]),
           friction_violation(gap + 1, multiplier + 1, multiplier[0], friction, r)};
 }

@@ -30,7 +30,7 @@ double violations(const ContactProblem& problem, const VectorXd& diagonal, const
   double sum = 0;
   worst = 0;
   for (Index k = 0; k < problem.friction.size(); ++k) {
-    const ContactViolation<double> of_contact = contact_violation(
+    const ContactViolation of_contact = contact_violation(
         &gap[3 * k], &multiplier[3 * k], problem.friction[k], &diagonal[3 * k], problem.time_step);
     sum += of_contact.normal * of_contact.normal + of_contact.tangential * of_contact.tangential;
     worst = std::max({worst, of_contact.normal, of_contact.tangential});
@@ -40,11 +40,11 @@ double violations(const ContactProblem& problem, const VectorXd& diagonal, const
 
 /// The rows of all contacts.
 struct Linearisation {
-  std::vector<ContactRows<double>> contacts;
+  std::vector<ContactRows> contacts;
 
-  std::vector<ConstraintRow<double>> rows() const {
-    std::vector<ConstraintRow<double>> all;
-    for (const ContactRows<double>& contact : contacts) all.insert(all.end(), contact.rows, contact.rows + 3);
+  std::vector<ConstraintRow> rows() const {
+    std::vector<ConstraintRow> all;
+    for (const ContactRows& contact : contacts) all.insert(all.end(), contact.rows, contact.rows + 3);
     return all;
   }
 };

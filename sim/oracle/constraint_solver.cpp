@@ -147,11 +147,11 @@ struct ScaledRows {
   VectorXd E;      ///< compliance [1/kg]
 };
 
-ScaledRows scaled_rows(const std::vector<ConstraintRow<double>>& rows, double h) {
+ScaledRows scaled_rows(const std::vector<ConstraintRow>& rows, double h) {
   const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
   ScaledRows s{VectorXd::Zero(n), VectorXd::Zero(n), VectorXd::Zero(n)};
   for (Eigen::Index i = 0; i < n; ++i) {
-    const ConstraintRow<double>& row = rows[i];
+    const ConstraintRow& row = rows[i];
     s.E[i] = row.compliance;
     if (row.omega > 1e-14)
       s.scale[i] = std::sqrt(row.omega);
@@ -161,7 +161,7 @@ ScaledRows scaled_rows(const std::vector<ConstraintRow<double>>& rows, double h)
   return s;
 }
 
-VectorXd scaled_right_hand_side(const std::vector<ConstraintRow<double>>& rows, const ScaledRows& s,
+VectorXd scaled_right_hand_side(const std::vector<ConstraintRow>& rows, const ScaledRows& s,
                                 const VectorXd& W_known, double h) {
   VectorXd b = VectorXd::Zero(s.scale.size());
   for (Eigen::Index i = 0; i < b.size(); ++i)
@@ -224,7 +224,7 @@ DualSolution solve_symmetric(const Operator& K, const VectorXd& diagonal, const 
   return Krylov(regular, jacobi, b, settings).solve(&Krylov::conjugate_residual);
 }
 
-DualSolution solve_dual(const MatrixXd& W, const std::vector<ConstraintRow<double>>& rows, double h,
+DualSolution solve_dual(const MatrixXd& W, const std::vector<ConstraintRow>& rows, double h,
                         const DualSolverSettings& settings) {
   const ScaledRows s = scaled_rows(rows, h);
   MatrixXd K = s.scale.asDiagonal() * W * s.scale.asDiagonal();
@@ -234,9 +234,8 @@ DualSolution solve_dual(const MatrixXd& W, const std::vector<ConstraintRow<doubl
   return solution;
 }
 
-DualSolution solve_dual(const Operator& W, const VectorXd& diagonal,
-                        const std::vector<ConstraintRow<double>>& rows, double h,
-                        const DualSolverSettings& settings) {
+DualSolution solve_dual(const Operator& W, const VectorXd& diagonal, const std::vector<ConstraintRow>& rows,
+                        double h, const DualSolverSettings& settings) {
   const ScaledRows s = scaled_rows(rows, h);
   VectorXd W_known(s.known.size());
   W(s.known, W_known);

@@ -59,10 +59,9 @@ DualSolution solve_symmetric(const Operator& K, const Eigen::VectorXd& diagonal,
 /// omega = 0 are known, dlambda = rhs / (h^2 E), and move to the right-hand side. Where every omega is 0 or 1
 /// the matrix is the published Omega W Omega + E; unlike that one it stays exact for the fractional weights
 /// of Fischer-Burmeister.
-DualSolution solve_dual(const Eigen::MatrixXd& W, const std::vector<ConstraintRow<double>>& rows, double h,
+DualSolution solve_dual(const Eigen::MatrixXd& W, const std::vector<ConstraintRow>& rows, double h,
                         const DualSolverSettings& settings);
 DualSolution solve_dual(const Operator& W, const Eigen::VectorXd& diagonal,
-                        const std::vector<ConstraintRow<double>>& rows, double h,
-                        const DualSolverSettings& settings);
+                        const std::vector<ConstraintRow>& rows, double h, const DualSolverSettings& settings);
 
 }  // namespace flash::sim

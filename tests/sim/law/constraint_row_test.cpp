@@ -32,7 +32,7 @@ std::vector<Sample> samples() {
 
 TEST(ConstraintRow, FischerBurmeisterRowIsTheDerivative) {
   for (const auto& [c, l, r] : samples()) {
-    const ConstraintRow<double> row = normal_row_fischer_burmeister(c, c, l, r, h);
+    const ConstraintRow row = normal_row_fischer_burmeister(c, c, l, r, h);
     const double rho = std::hypot(c, r * l);
     const double step = 1e-4 * rho;
     // Central differences: truncation (step / rho)^2 of a function with derivatives of order one.
@@ -48,7 +48,7 @@ TEST(ConstraintRow, MinimumMapRowIsTheDerivative) {
   for (const auto& [c, l, r] : samples()) {
     const double distance = std::fabs(c - r * l);  // to the kink
     const double step = 0.1 * distance;
-    const ConstraintRow<double> row = normal_row_minimum_map(c, c, l, r, h);
+    const ConstraintRow row = normal_row_minimum_map(c, c, l, r, h);
     EXPECT_NEAR(row.omega, (minimum_map(c + step, l, r) - minimum_map(c - step, l, r)) / (2 * step), 1e-9);
     EXPECT_NEAR(h * h * row.compliance / r,
                 (minimum_map(c, l + step / r, r) - minimum_map(c, l - step / r, r)) / (2 * step), 1e-9);
@@ -64,8 +64,8 @@ TEST(ConstraintRow, LinearisedRowPredictsTheFunctionAfterTheFreeMotion) {
     const double free_gap = c + 1e-6 * scale, dl = 1e-6 * scale / std::max(r, h * h * W);
     for (const bool smooth : {true, false}) {
       if (!smooth && std::fabs(c - r * l) < 1e-4 * scale) continue;
-      const ConstraintRow<double> row = smooth ? normal_row_fischer_burmeister(c, free_gap, l, r, h)
-                                               : normal_row_minimum_map(c, free_gap, l, r, h);
+      const ConstraintRow row = smooth ? normal_row_fischer_burmeister(c, free_gap, l, r, h)
+                                       : normal_row_minimum_map(c, free_gap, l, r, h);
       const double c_new = free_gap + h * h * W * dl, l_new = l + dl;
       const double value = smooth ? smooth_map(c_new, l_new, r) : minimum_map(c_new, l_new, r);
       const double predicted = h * h * (row.omega * W + row.compliance) * dl - row.rhs;
@@ -77,7 +77,7 @@ TEST(ConstraintRow, LinearisedRowPredictsTheFunctionAfterTheFreeMotion) {
 TEST(ConstraintRow, KinksTakeAnElementOfTheGeneralisedGradient) {
   const double r = 2e-4;
   // Fischer-Burmeister at the origin: {(1 - a, r (1 - b)) : a^2 + b^2 <= 1}.
-  const ConstraintRow<double> smooth = normal_row_fischer_burmeister(0.0, 0.0, 0.0, r, h);
+  const ConstraintRow smooth = normal_row_fischer_burmeister(0.0, 0.0, 0.0, r, h);
   const double a = 1 - smooth.omega, b = 1 - smooth.compliance * h * h / r;
   EXPECT_LE(a * a + b * b, 1 + 1e-12);
   EXPECT_EQ(smooth.rhs, 0);
@@ -85,14 +85,14 @@ TEST(ConstraintRow, KinksTakeAnElementOfTheGeneralisedGradient) {
   // Minimum map on c = r lambda: {(w, r (1 - w)) : 0 <= w <= 1}.
   for (const double c : {-1e-3, 0.0, 2e-3}) {
     const double l = c / r;
-    const ConstraintRow<double> row = normal_row_minimum_map(r * l, r * l, l, r, h);
+    const ConstraintRow row = normal_row_minimum_map(r * l, r * l, l, r, h);
     EXPECT_GE(row.omega, 0);
     EXPECT_LE(row.omega, 1);
     EXPECT_NEAR(row.compliance * h * h, r * (1 - row.omega), 1e-18);
   }
   // Approached along any ray the row stays inside the disc.
   for (double angle = 0; angle < 6.28; angle += 0.1) {
-    const ConstraintRow<double> row =
+    const ConstraintRow row =
         normal_row_fischer_burmeister(1e-300 * std::cos(angle), 0.0, 1e-300 / r * std::sin(angle), r, h);
     EXPECT_TRUE(std::isfinite(row.omega) && std::isfinite(row.compliance));
   }
@@ -122,7 +122,7 @@ TEST(ConstraintRow, FrictionComplianceIsTheRatioOfItsFormula) {
     const double radius = mu * normal * (0.5 + 0.4 * unit(random)), angle = 3.14 * unit(random);
     const double l[2] = {radius * std::cos(angle), radius * std::sin(angle)};
     const double c[2] = {1e-4 * unit(random), 1e-4 * unit(random)};
-    const FrictionRows<double> row = friction_rows(c, c, l, normal, mu, r, h);
+    const FrictionRows row = friction_rows(c, c, l, normal, mu, r, h);
     const double u = std::hypot(c[0], c[1]) / h, t = r * (mu * normal - radius), rho = std::hypot(u, t);
     // As the design states it; the subtraction rho - t loses digits where u << t.
     const double expected = (rho - t) / (u + r * mu * normal - rho) * r / h;
@@ -139,12 +139,12 @@ TEST(ConstraintRow, FrictionRowsVanishExactlyOnCoulomb) {
     const double zero[2] = {0, 0};
     const double inside[2] = {0.9 * mu * normal * direction[0], 0.9 * mu * normal * direction[1]};
     const double rim[2] = {mu * normal * direction[0], mu * normal * direction[1]};
-    const FrictionRows<double> stick = friction_rows(zero, zero, inside, normal, mu, r, h);
+    const FrictionRows stick = friction_rows(zero, zero, inside, normal, mu, r, h);
     EXPECT_EQ(stick.compliance, 0);
     EXPECT_EQ(stick.rhs[0], 0);
     EXPECT_EQ(stick.rhs[1], 0);
     const double slip[2] = {-1e-4 * direction[0], -1e-4 * direction[1]};
-    const FrictionRows<double> sliding = friction_rows(slip, slip, rim, normal, mu, r, h);
+    const FrictionRows sliding = friction_rows(slip, slip, rim, normal, mu, r, h);
     EXPECT_NEAR(h * h * sliding.compliance, 1e-4 / (mu * normal), 1e-15);
     EXPECT_NEAR(sliding.rhs[0], 0, 1e-18);
     EXPECT_NEAR(sliding.rhs[1], 0, 1e-18);
@@ -160,7 +160,7 @@ TEST(ConstraintRow, FrictionRowIsTheDerivativeOfItsLawAtFrozenCompliance) {
   // g(lambda) = c(lambda) + h^2 E lambda with c = c_free + h^2 W (lambda - lambda_0): dg = h^2 (W + E).
   const double mu = 0.4, normal = 2, r = 0.02, W = r / h;
   const double c[2] = {3e-5, -1e-5}, free_slip[2] = {4e-5, 2e-5}, l[2] = {0.1, 0.5};
-  const FrictionRows<double> row = friction_rows(c, free_slip, l, normal, mu, r, h);
+  const FrictionRows row = friction_rows(c, free_slip, l, normal, mu, r, h);
   for (int k : {0, 1}) {
     const auto g = [&](double dl) { return free_slip[k] + h * h * (W * dl + row.compliance * (l[k] + dl)); };
     const double slope = (g(1e-3) - g(-1e-3)) / 2e-3;
@@ -185,7 +185,7 @@ TEST(ConstraintRow, SlipRowsAreTheDerivativeOfTheProjectionOnTheDisc) {
     const double l[2] = {0.6 * unit(random), 0.6 * unit(random)};
     const double q = std::hypot(l[0] - c[0] / r, l[1] - c[1] / r);
     if (std::fabs(q - limit) < 0.05 * limit) continue;  // the kink
-    const SlipRows<double> rows = slip_rows(c, c, l, normal, mu, r, h);
+    const SlipRows rows = slip_rows(c, c, l, normal, mu, r, h);
     const double e[2] = {rows.direction[0], rows.direction[1]}, p[2] = {-e[1], e[0]};
     EXPECT_EQ(rows.along.omega == 0, q > limit);
     // Each row is its component of the map times a factor; the factor is read off one derivative, the rest
@@ -198,7 +198,7 @@ TEST(ConstraintRow, SlipRowsAreTheDerivativeOfTheProjectionOnTheDisc) {
       return axis[0] * value[0] + axis[1] * value[1];
     };
     const double dl = 1e-5, dc = r * dl;
-    const auto check = [&](const ConstraintRow<double>& row, const double* axis, bool is_along) {
+    const auto check = [&](const ConstraintRow& row, const double* axis, bool is_along) {
       const double by_c = (component(axis, is_along * dc, !is_along * dc, 0, 0) -
                            component(axis, -is_along * dc, -!is_along * dc, 0, 0)) /
                           (2 * dl);
@@ -225,15 +225,15 @@ TEST(ConstraintRow, SlipRowsVanishExactlyOnCoulomb) {
   for (double angle = 0; angle < 6.28; angle += 0.37) {
     const double rim[2] = {mu * normal * std::cos(angle), mu * normal * std::sin(angle)};
     const double slip[2] = {-1e-4 * std::cos(angle), -1e-4 * std::sin(angle)}, zero[2] = {0, 0};
-    const SlipRows<double> sliding = slip_rows(slip, slip, rim, normal, mu, r, h);
+    const SlipRows sliding = slip_rows(slip, slip, rim, normal, mu, r, h);
     EXPECT_NEAR(sliding.along.rhs, 0, 1e-17);
     EXPECT_NEAR(sliding.across.rhs, 0, 1e-17);
     EXPECT_NEAR(h * h * sliding.across.compliance, 1e-4 / (mu * normal), 1e-15);
     const double inside[2] = {0.5 * rim[0], 0.5 * rim[1]};
-    const SlipRows<double> sticking = slip_rows(zero, zero, inside, normal, mu, r, h);
+    const SlipRows sticking = slip_rows(zero, zero, inside, normal, mu, r, h);
     EXPECT_EQ(sticking.along.rhs, 0);
     EXPECT_EQ(sticking.across.rhs, 0);
-    const SlipRows<double> lifted = slip_rows(slip, slip, rim, 0.0, mu, r, h);
+    const SlipRows lifted = slip_rows(slip, slip, rim, 0.0, mu, r, h);
     EXPECT_EQ(lifted.along.omega, 0);
     EXPECT_NEAR(lifted.along.rhs / (h * h * lifted.along.compliance), -rim[0], 1e-15);
   }
@@ -245,7 +245,7 @@ TEST(ConstraintRow, FrictionAtItsKinksIsFinite) {
     for (const auto* l : {zero, rim, over})
       for (const double normal : {0.0, 2.0})
         for (const double mu : {0.0, 0.4}) {
-          const FrictionRows<double> row = friction_rows(c, c, l, normal, mu, 0.02, h);
+          const FrictionRows row = friction_rows(c, c, l, normal, mu, 0.02, h);
           EXPECT_TRUE(std::isfinite(row.compliance)) << mu;
           EXPECT_GE(row.compliance, 0);
           EXPECT_GE(row.omega, 0);
@@ -259,7 +259,7 @@ TEST(ConstraintRow, FrictionAtItsKinksIsFinite) {
 TEST(ConstraintRow, BilateralRowReachesItsAnchorInOneStep) {
   const double W = 5, free_gap = 3e-3, l = 0.7;
   for (const double compliance : {0.0, 2.0}) {
-    const ConstraintRow<double> row = bilateral_row(free_gap, l, compliance, h);
+    const ConstraintRow row = bilateral_row(free_gap, l, compliance, h);
     const double dl = row.rhs / (h * h * (row.omega * W + row.compliance));
     EXPECT_NEAR(free_gap + h * h * W * dl + h * h * compliance * (l + dl), 0, 1e-17);
   }

@@ -133,7 +133,7 @@ TEST(DualSolver, RowsGiveTheExactNewtonStepWhateverTheirWeights) {
   const MatrixXd W = random_spd(n, 1e3, 11);
   std::mt19937 random(12);
   std::uniform_real_distribution<double> unit(0, 1);
-  std::vector<ConstraintRow<double>> rows;
+  std::vector<ConstraintRow> rows;
   for (int i = 0; i < n; ++i) {
     if (i % 3 == 0)
       rows.push_back({0, 0.1 + unit(random), 1e-3 * (unit(random) - 0.5)});
