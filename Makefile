@@ -262,7 +262,7 @@ cmake --build --preset $1 -j $(JOBS)
 ctest --preset $1 -j $(JOBS)
 endef
 
-python-test: packages-build packages-test  ## Build the wheel of flash_sim in build/python, install it and run its tests
+python-test: packages-build packages-test  ## Build the wheels of flash_sim and flash_calib in build/python and build/python-calib, install them and run their tests
 	scripts/python-test $(PYTHON)
 
 python-rate: python-test  ## Say how fast 128 environments step from Python beside C++, on PYTHON_DEVICE=cpu or cuda

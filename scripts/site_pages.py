@@ -41,13 +41,17 @@ def program_page(name):
 
 
 def python_page():
-    return ("# Classes and functions\n\nThe docstrings of the package. How it is used stands in [Python](../python.md).\n\n" +
+    return ("# Classes and functions\n\nThe docstrings of both packages. How they are used stands in [Python](../python.md).\n\n" +
             "\n\n".join(f"::: flash_sim.{name}" for name in (
                 "realtime_sim.RealtimeSim", "asset.Asset", "sysid.load", "sysid.Recording", "sysid.replay", "sysid.Motion",
                 "sysid.distances", "sysid.Distances", "sysid.Likelihood", "sysid.answer", "sysid.Answer", "sysid.parameters",
                 "device_array.DeviceArray", "device_array.to_host",
                 "cameras.look_at", "depth_noise.DepthNoise", "depth_noise.add_depth_noise", "depth_noise.jitter_poses",
-                "folds.Fold", "tasks.FoldSettings", "tasks.FoldTask", "gym.FoldVectorEnv", "rsl.FoldVecEnv")) + "\n")
+                "folds.Fold", "tasks.FoldSettings", "tasks.FoldTask", "gym.FoldVectorEnv", "rsl.FoldVecEnv")) + "\n\n" +
+            "\n\n".join(f"::: flash_calib.{name}" for name in (
+                "handeye.handeye_pairs", "handeye.handeye_corners", "handeye.target_points", "results.load", "results.Calibration",
+                "results.HeldOut", "results.Noise", "results.Size", "results.Weakest", "results.Lens", "cameras.Camera",
+                "cameras.load_camera")) + "\n")
 
 
 def cpp_page():

@@ -6,18 +6,15 @@
 #include <tuple>
 
 #include "calib/dataset/edge_offset.h"
+#include "calib/dataset/posed_detection.h"
 #include "calib/detect/find_in_all.h"
 #include "calib/detect/finder.h"
-#include "calib/detect/planar_pose.h"
 #include "data/files/error.h"
 #include "data/files/text.h"
 #include "data/machine/parallel.h"
-#include "data/numbers/median.h"
 
 namespace flash::calib {
 namespace {
-
-constexpr double kAlwaysGood = 2;  // small markers, seen aslant, vary by that much [px]
 
 Observation observe(const Frame& frame, const Target& target, const Sighting& sighting) {
   Observation observation;
@@ -33,38 +30,6 @@ Observation observe(const Frame& frame, const Target& target, const Sighting& si
   return observation;
 }
 
-Eigen::Matrix3Xd chosen(const Eigen::Matrix3Xd& points, const std::vector<int>& ids) {
-  Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(ids.size()));
-  for (std::size_t i = 0; i < ids.size(); ++i) result.col(static_cast<Eigen::Index>(i)) = points.col(ids[i]);
-  return result;
-}
-
-/// The poses of each reading; drops those that no pose fits.
-void add_poses(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points, double largest_rms,
-               Detection& detection) {
-  double least = 1e300;
-  for (CornerReading& reading : detection.readings) {
-    Observation& observation = reading.observation;
-    for (const PlanarPose& pose :
-         planar_poses(camera, chosen(points, observation.points), observation.pixels)) {
-      if (observation.T_camera_target.empty()) observation.pose_rms = pose.rms;
-      observation.T_camera_target.push_back(pose.T_camera_target);
-    }
-    if (!observation.T_camera_target.empty()) least = std::min(least, observation.pose_rms);
-  }
-  std::erase_if(detection.readings, [&](const CornerReading& reading) {
-    return reading.observation.T_camera_target.empty() || reading.observation.pose_rms > largest_rms;
-  });
-  std::stable_sort(detection.readings.begin(), detection.readings.end(),
-                   [](const CornerReading& a, const CornerReading& b) {
-                     return a.observation.pose_rms < b.observation.pose_rms;
-                   });
-  if (detection.readings.empty())
-    detection.reason = least < 1e300
-                           ? "the corners fit the target no better than " + data::format_short(least) + " px"
-                           : "the corners fit no pose of the target";
-}
-
 /// What was found in a picture, with the poses that fit it where there are intrinsics.
 Detection detection_of(const Frame& frame, const Found& found, const Dataset& dataset, const Target& target,
                        const Eigen::Matrix3Xd& points, const DetectSettings& settings) {
@@ -73,34 +38,9 @@ Detection detection_of(const Frame& frame, const Found& found, const Dataset& da
   detection.reason = found.reason;
   for (const Sighting& sighting : found.sightings)
     detection.readings.push_back({sighting.refiner, observe(frame, target, sighting)});
-  if (dataset.camera && detection.reason.empty())
-    add_poses(*dataset.camera, points, settings.largest_rms, detection);
+  if (dataset.camera && detection.reason.empty()) add_poses(*dataset.camera, points, settings.fit, detection);
   return detection;
 }
-
-}  // namespace
-
-void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detections) {
-  std::vector<double> rms;
-  for (const Detection& detection : detections)
-    if (!detection.readings.empty()) rms.push_back(detection.readings.front().observation.pose_rms);
-  if (rms.empty()) return;
-  const double usual = data::median(rms);
-  const double limit = std::max(kAlwaysGood, settings.largest_ratio * usual);
-  for (Detection& detection : detections) {
-    if (detection.readings.empty()) continue;
-    const double found = detection.readings.front().observation.pose_rms;
-    if (found > limit) {
-      detection.readings.clear();
-      detection.reason = "the corners fit the target to " + data::format_short(found) +
-                         " px, the usual view to " + data::format_short(usual) + " px";
-    }
-    std::erase_if(detection.readings,
-                  [&](const CornerReading& reading) { return reading.observation.pose_rms > limit; });
-  }
-}
-
-namespace {
 
 /// Width and height of the first picture that can be read.
 std::pair<int, int> picture_size(const Dataset& dataset) {
@@ -162,7 +102,7 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
     detections[k] = detection_of(dataset.frames[k], found[k], dataset, target, points, settings);
   });
 
-  drop_misfits(settings, detections);
+  drop_misfits(settings.fit, detections);
   const bool none = std::all_of(detections.begin(), detections.end(),
                                 [](const Detection& detection) { return detection.readings.empty(); });
   const std::string shown = none ? shown_instead(dataset, target, rectifier) : std::string();

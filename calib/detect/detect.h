@@ -5,6 +5,7 @@
 
 #include "calib/dataset/dataset.h"
 #include "calib/dataset/detection.h"
+#include "calib/dataset/posed_detection.h"
 #include "calib/dataset/target.h"
 
 namespace flash::calib {
@@ -13,8 +14,7 @@ struct DetectSettings {
   int threads = 0;    ///< 0: as many as there are processors
   std::string cache;  ///< folder that keeps what was found, by content; empty: none
   std::function<void(const std::string&)> tell = {};  ///< of the cache: a full disk, once; edited files
-  double largest_rms = 10;   ///< a view whose pose fits no better shows no target [px]
-  double largest_ratio = 6;  ///< nor one worse than that many times the usual view of the set, above 2 px
+  FitSettings fit;
 };
 
 /// Looks for the target in every picture of a set; a detection for each frame, in their order. Without
@@ -28,10 +28,6 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target,
 /// with the picture is the reason.
 Detection detect_one(const Frame& frame, const Dataset& dataset, const Target& target,
                      const DetectSettings& settings = {});
-
-/// Empties the detections that fit far worse than the usual one of the set, and says why: they show wrong
-/// corners. detect() has done so.
-void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detections);
 
 /// Where the intrinsics say nothing of the size of the pictures, that of the first one that can be read; said
 /// among the guesses.

@@ -176,7 +176,7 @@ class Follower {
         reading.observation.joint_sd = frame.joint_sd;
       }
     }
-    drop_misfits(settings_.detect, detections);
+    drop_misfits(settings_.detect.fit, detections);
     return {std::move(dataset), std::move(detections)};
   }
 

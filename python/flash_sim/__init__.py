@@ -1,7 +1,8 @@
 """Cloth and soft bodies in many environments, on assets that were identified from recordings.
 
-RealtimeSim steps a scene; Asset reads what was identified; sysid replays recordings and reads answers. All numbers are in SI
-units, all arrays float64. The compiled part is loaded with the first of these names; flash_sim.bag needs none of it.
+RealtimeSim steps a scene; Asset reads what was identified; sysid replays recordings and reads answers; calib, which comes with a
+wheel of its own, says where cameras are. All numbers are in SI units, all arrays float64. The compiled part is loaded with the
+first of these names; flash_sim.bag needs none of it.
 """
 import importlib
 from typing import TYPE_CHECKING
@@ -27,10 +28,10 @@ def __getattr__(name):
         value = getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
         globals()[name] = value
         return value
-    if name in {*_MODULES.values(), "arguments", "programs", "sysid"}:
+    if name in {*_MODULES.values(), "arguments", "calib", "programs", "sysid"}:
         return importlib.import_module(f"{__name__}.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__():
-    return sorted({*globals(), *__all__, "sysid"})
+    return sorted({*globals(), *__all__, "calib", "sysid"})

@@ -8,7 +8,7 @@
 #include "calib/check/cloud_check.h"
 #include "calib/check/projection_check.h"
 #include "calib/detect/finder.h"
-#include "calib/detect/planar_pose.h"
+#include "calib/geometry/planar_pose.h"
 #include "tests/calib/rendered_view.h"
 
 namespace flash::calib {
