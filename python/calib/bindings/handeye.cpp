@@ -136,13 +136,14 @@ calib::Calibration calibrate_corners(calib::Setup setup, const std::vector<Eigen
         corners_of(pixels + 2 * static_cast<std::size_t>(shown.points.cols()) * i, shown);
     view.image = "view " + std::to_string(i);
     view.T_base_gripper = grippers[i];
-    calib::Detection detection{.image = view.image};
-    if (view.points.size() < 4)
+    calib::Detection& detection = detections.emplace_back();
+    detection.image = view.image;
+    if (view.points.size() < 4) {
       detection.reason = "found " + std::to_string(view.points.size()) + " corners, expected 4 or more";
-    else
-      detection.readings.push_back({"given", std::move(view)});
+      continue;
+    }
+    detection.readings.push_back({"given", std::move(view)});
     calib::add_poses(camera, shown.points, {}, detection);
-    detections.push_back(std::move(detection));
   }
   calib::drop_misfits({}, detections);
   std::vector<calib::Observation> views;
