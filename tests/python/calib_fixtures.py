@@ -37,7 +37,7 @@ def cell(setup, count=16, seed=1, noise=(5e-4, 5e-4), sight=(1e-3, 2e-4)):
     return np.array(robot), np.array(target), X, Z
 
 
-def board(columns=9, rows=6, side=0.02):
+def board(columns=6, rows=5, side=0.03):
     """Inner corners of a chessboard, row by row."""
     y, x = np.mgrid[:rows, :columns]
     return np.stack([side * x.ravel(), side * y.ravel(), np.zeros(x.size)], axis=1)

@@ -73,12 +73,12 @@ def text(what, value):
     return value
 
 
-def path(what, value, kind):
-    """The path of a file as text. `kind`: what it should be, as "a file of flash-calib"."""
+def path(what, value, of):
+    """The path of a file as text. `of`: what it should be, as "a file of flash-calib"."""
     try:
         return text(what, os.fsdecode(value))
     except TypeError:
-        raise TypeError(f"{what}: found {value!r:.60}, expected the path of {kind}") from None
+        raise TypeError(f"{what}: found {kind(value)}, expected the path of {of}") from None
 
 
 def one_of(what, value, known):

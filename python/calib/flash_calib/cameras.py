@@ -50,7 +50,7 @@ def camera_of(values, covariance=None):
 def checked(what, camera):
     """The numbers of a camera as the calibration takes them, and its covariance or None."""
     if not isinstance(camera, Camera):
-        raise TypeError(f"{what}: found {camera!r:.60}, expected a flash_calib.Camera")
+        raise TypeError(f"{what}: found {arguments.kind(camera)}, expected a flash_calib.Camera")
     size = [arguments.whole_number(f"{what}: {name}", getattr(camera, name), 1, 100_000) for name in ("width", "height")]
     focal = [arguments.number(f"{what}: {name}", getattr(camera, name), 1, 1e6) for name in ("fx", "fy")]
     centre = [arguments.number(f"{what}: {name}", getattr(camera, name), -1e6, 1e6) for name in ("cx", "cy")]

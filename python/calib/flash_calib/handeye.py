@@ -108,7 +108,7 @@ def _settings(what, target_size, target_size_sd, camera_height, target_height, h
         settings.size_as_stated = True
     elif target_size is not None:
         if target_size_sd is not None:
-            raise ValueError(f"{what}: target_size, target_size_sd: found 'solved' and {target_size_sd!r:.60}, expected one of both")
+            raise ValueError(f"{what}: target_size, target_size_sd: found 'solved' and {arguments.kind(target_size_sd)}, expected one of both")
         settings.target_size_sd = float("inf")
     if camera_height is not None and target_height is not None:
         raise ValueError(f"{what}: camera_height, target_height: found both, expected one")
@@ -125,7 +125,7 @@ def _height(what, value):
     height = arguments.numbers(what, value, (), (2,)).reshape(-1)
     sd = height[1] if len(height) == 2 else 1e-3
     if not abs(height[0]) < 10 or not 0 < sd < 10:
-        raise ValueError(f"{what}: found {value!r:.60}, expected metres below 10, and their deviation above 0, as (0.35, 0.002)")
+        raise ValueError(f"{what}: found {arguments.kind(value)}, expected metres below 10, and their deviation above 0, as (0.35, 0.002)")
     return height[0], sd
 
 

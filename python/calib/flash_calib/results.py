@@ -78,6 +78,7 @@ class Calibration:
     held_out: HeldOut
     noise: Noise
     size: Size | None
+    focal_length: Size | None  # of pairs of poses, where it was solved for: over that with which the target's poses were made
     weakest: Weakest
     lens: Lens | None  # None of pairs of poses
     summary: dict  # all of the file "flash-extrinsics/2"
@@ -133,7 +134,7 @@ def calibration_of(found, summary):
         held_out=HeldOut(residuals["heldout_mm"] / 1e3, math.radians(residuals["heldout_deg"]), residuals["heldout_px"]),
         noise=Noise(sigmas["robot_rotation_rad"], sigmas["robot_translation_m"], sigmas["corner_px"], sigmas.get("across_sight_m"),
                     sigmas.get("along_sight_m")),
-        size=_size(summary.get("scale")),
+        size=_size(summary.get("scale")), focal_length=_size(summary.get("focal_length")),
         weakest=Weakest(weakest["weakest"], weakest["weakest_mm"] / 1e3, math.radians(weakest["weakest_deg"])),
         lens=_lens(summary.get("lens")), summary=summary, text=found["text"])
 
