@@ -110,5 +110,5 @@ def _name(shape):
 
 
 def kind(value):
-    kind = getattr(value, "dtype", None)
-    return f"{type(value).__name__} of {kind}" if kind is not None else " ".join(f"{value!r:.60}".split())
+    dtype = getattr(value, "dtype", None)
+    return f"{type(value).__name__} of {dtype}" if dtype is not None else " ".join(f"{value!r:.60}".split())
