@@ -43,7 +43,7 @@ def test_own_objective(run):
 def test_calibrate_from_python(run, capsys):
     names = run("docs/how_to/calibrate_from_python.md")
     answer, wrist = names["answer"], names["wrist"]
-    assert abs(answer.T[:3, 3] - names["X"][:3, 3]).max() < 4 * answer.sd[:3].max() < 4e-3
+    assert abs(answer.T[:3, 3] - names["X"][:3, 3]).max() < 4 * answer.sd[:3].max() < 1e-2
     assert "inverted" in capsys.readouterr().out
     truth = np.loadtxt(ROOT / "examples/handeye/wrist/truth/X_and_Z.tum")[0, 1:4]
     assert abs(wrist.T[:3, 3] - truth).max() < 4 * wrist.sd[:3].max() < 8e-3
