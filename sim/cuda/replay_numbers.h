@@ -80,7 +80,7 @@ struct ReplayStats {
   FLASH_HOST_DEVICE int work() const { return solves + 2 * iterations + 8 * factorizations; }
 };
 
-/// Memory of a team for that method.
+/// Memory of a team for the generalized minimal residuals of a step with contacts.
 struct CoupledMemory {
   float* left;        ///< a matrix for each restriction, nine numbers, column after column
   float* basis;       ///< most_directions + 1 vectors, three numbers a vertex
