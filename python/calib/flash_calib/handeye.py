@@ -14,7 +14,7 @@ LARGEST_PIXEL = 1e6  # of a corner [px]
 Height = float | tuple[float, float]
 
 
-def handeye_pairs(setup: str, T_base_gripper: ArrayLike, T_camera_target: ArrayLike, *, target_size: str | None = None,
+def handeye_pairs(setup: str, T_base_gripper: ArrayLike, T_camera_target: ArrayLike, *, lens: str = "near", target_size: str | None = None,
                   target_size_sd: float | None = None, camera_height: Height | None = None, target_height: Height | None = None,
                   held_out_seed: int = 0, threads: int = 0) -> Calibration:
     """Where the camera is, from pairs of poses: what flash-calib handeye says of the same pairs.
@@ -24,6 +24,8 @@ def handeye_pairs(setup: str, T_base_gripper: ArrayLike, T_camera_target: ArrayL
     T_base_gripper, T_camera_target: N poses each, of the same moments, as (N, 4, 4), (N, 3, 4) or (N, 7), x y z qx qy qz qw [m].
     Four are the least; 12 and more are better, that tilt by 20 to 40 degrees about two axes.
 
+    lens: of the camera whose poses T_camera_target are. "near": its focal length is known to 0.5 %, and solved for; "stated": exact;
+    "solved": nothing is known of it. Poses of a tracker, which stand off its axis, have none.
     target_size: "stated" keeps the size of the target as the poses have it, "solved" says that nobody knows it; None: it is known to
     target_size_sd, one standard deviation as a share of it (0: exactly; None: 1 %).
     camera_height, target_height: of a robot that turns about one axis alone, where camera or target is along that axis: metres, or
@@ -39,7 +41,9 @@ def handeye_pairs(setup: str, T_base_gripper: ArrayLike, T_camera_target: ArrayL
     target = arguments.poses(f"{what}: T_camera_target", T_camera_target)
     if len(robot) != len(target):
         raise ValueError(f"{what}: T_camera_target: found {len(target)} poses, expected {len(robot)}, as of T_base_gripper")
+    arguments.one_of(f"{what}: lens", lens, ("near", "stated", "solved"))
     settings = _settings(what, target_size, target_size_sd, camera_height, target_height, held_out_seed, threads)
+    settings.set_lens(lens)
     return _solved(what, _core.handeye_pairs, setup, robot, target, settings)
 
 
