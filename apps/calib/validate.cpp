@@ -337,9 +337,10 @@ int run_validate(const CLI::App& verb, ValidateOptions options) {
   const data::PosedLens posed = lens_of(extrinsics, dataset, options, choice);
   if (!posed.notice.empty()) warn_calib(posed.notice);
   const data::CameraIntrinsics& lens = posed.lens;
-  if (!pairs)
-    observations = calib::with_poses_for(lens, target, extrinsics.target, std::move(observations),
-                                         extrinsics.edge_offset);
+  observations =
+      pairs ? calib::with_scales(std::move(observations), extrinsics.target.scale, extrinsics.focal_length)
+            : calib::with_poses_for(lens, target, extrinsics.target, std::move(observations),
+                                    extrinsics.edge_offset);
   calib::HandEyePoses poses{extrinsics.transform.T, extrinsics.target_pose.T};
   if (options.refit_target) poses.Z = calib::target_pose_from(extrinsics.setup, poses.X, observations);
   const calib::ProjectionCheck check = calib::check_projection(

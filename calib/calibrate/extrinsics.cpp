@@ -113,6 +113,9 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
     extrinsics.edge_offset = edge_offset(calibration.refined.bundle, 0);
     extrinsics.lens = calibration.refined.bundle.intrinsics.front();
     extrinsics.stated_lens = with_vector(*extrinsics.lens, calibration.lens.stated);
+  } else {
+    if (calibration.size) extrinsics.target.scale = calibration.size->estimate;
+    if (calibration.focal_length) extrinsics.focal_length = calibration.focal_length->estimate;
   }
   const auto errors =
       joint_errors(calibration.refined.bundle, calibration.unknowns, calibration.shared_covariance);
@@ -171,6 +174,8 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
     extrinsics.size_unknown = scale.boolean("solved", false) && !scale.has("prior_sd");
     if (scale.has("warp_mm")) extrinsics.target.warp = read_warp(scale);
   }
+  if (object.has("focal_length"))
+    extrinsics.focal_length = object.object("focal_length").positive("estimate");
   if (object.has("edges")) extrinsics.edge_offset = object.object("edges").number("offset_px");
   if (object.has("use")) {
     const std::string use = object.object("use").string("for", "workspace");

@@ -50,6 +50,7 @@ struct Extrinsics {
   NamedTransform target_pose;                  ///< base <- target (eye-in-hand) or gripper <- target
   Matrix6d covariance = Matrix6d::Zero();      ///< of the transform, right perturbation (dt, dtheta) [m, rad]
   TargetShape target;                          ///< that transform and target_pose are for
+  double focal_length = 1;                     ///< of pose pairs, over that with which they were made
   bool size_unknown = false;                   ///< nothing was known of the target's size beforehand
   double edge_offset = 0;                      ///< of the camera's pictures [px], see EdgeOffset
   std::optional<data::CameraIntrinsics> lens;  ///< likewise; none of pose pairs

@@ -120,6 +120,15 @@ std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, co
   return observations;
 }
 
+std::vector<Observation> with_scales(std::vector<Observation> pairs, double size, double focal_length) {
+  for (Observation& pair : pairs)
+    for (Eigen::Isometry3d& T : pair.T_camera_target) {
+      T.translation() *= size;
+      T.translation().z() *= focal_length;
+    }
+  return pairs;
+}
+
 Eigen::Isometry3d target_pose_from(Setup setup, const Eigen::Isometry3d& X,
                                    const std::vector<Observation>& observations) {
   std::vector<Eigen::Isometry3d> poses;

@@ -40,6 +40,10 @@ std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, co
                                         const TargetShape& shape, std::vector<Observation> observations,
                                         double edge_offset = 0);
 
+/// Pairs of poses as seen of a target of that size over the stated one, with that focal length over the
+/// stated one.
+std::vector<Observation> with_scales(std::vector<Observation> pairs, double size, double focal_length);
+
 /// T_base_target (eye-in-hand) or T_gripper_target as the mean over the views, for a target that was moved
 /// since.
 Eigen::Isometry3d target_pose_from(Setup setup, const Eigen::Isometry3d& X,

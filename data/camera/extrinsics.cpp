@@ -158,7 +158,8 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
                       "comparison",  "views",      "observability", "convention_findings",
                       "scale",       "edges",      "splits",        "smooth_errors",
                       "joint_zeros", "use",        "warnings",      "exit_code",
-                      "one_axis",    "provenance", "link_lengths",  "joint_origins"});
+                      "one_axis",    "provenance", "link_lengths",  "joint_origins",
+                      "focal_length"});
   // The second version has joint_zeros, use and the depth of comparisons; what is read here is in both.
   const std::string schema = file.string("schema", "");
   if (schema != "flash-extrinsics/1" && schema != "flash-extrinsics/2")
