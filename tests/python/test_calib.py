@@ -69,12 +69,15 @@ def test_sizes_and_heights_are_options_of_the_program(tmp_path):
     robot, target, X, _ = cell("eye-to-hand", 20)
     target[:, :3, 3] /= 1.2  # a print that is larger than stated
     np.savez(tmp_path / "pairs.npz", robot=robot, target=target)
-    for arguments, words in [({"target_size": "solved"}, ["--target-size", "solved"]), ({"target_size_sd": 0.1}, ["--target-size-sd", 0.1])]:
+    for arguments, words in [({"target_size": "solved"}, ["--target-size", "solved"]), ({"target_size_sd": 0.1}, ["--target-size-sd", 0.1]),
+                             ({"target_size": "solved", "lens": "stated"}, ["--target-size", "solved", "--lens", "stated"])]:
         answer = flash_calib.handeye_pairs("eye-to-hand", robot, target, **arguments)
         said = json.loads(program("handeye", tmp_path / "pairs.npz", "--setup", "eye-to-hand", "--json", "--quiet", *words,
                                   code=0 if answer.usable else 3))
         assert without(answer.summary) == without(said)
+    assert answer.focal_length is None
     solved = flash_calib.handeye_pairs("eye-to-hand", robot, target, target_size="solved")
+    assert solved.focal_length.estimate == pytest.approx(1, abs=4 * solved.focal_length.sd)
     assert solved.size.estimate == pytest.approx(1.2, abs=4 * solved.size.sd) and solved.size.prior_sd is None
     expect_truth(solved, X)
     doubted = flash_calib.handeye_pairs("eye-to-hand", robot, target)
