@@ -338,7 +338,7 @@ int run_validate(const CLI::App& verb, ValidateOptions options) {
   if (!posed.notice.empty()) warn_calib(posed.notice);
   const data::CameraIntrinsics& lens = posed.lens;
   observations =
-      pairs ? calib::with_scales(std::move(observations), extrinsics.target.scale, extrinsics.focal_length)
+      pairs ? calib::with_scales(std::move(observations), {extrinsics.target.scale, extrinsics.focal_length})
             : calib::with_poses_for(lens, target, extrinsics.target, std::move(observations),
                                     extrinsics.edge_offset);
   calib::HandEyePoses poses{extrinsics.transform.T, extrinsics.target_pose.T};

@@ -1,11 +1,11 @@
 #include "calib/calibrate/pair_scales.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 
+#include "calib/calibrate/stated_uncertainty.h"
 #include "calib/solve/convention_check.h"
 #include "calib/solve/lens_prior.h"
 #include "calib/uncertainty/split_check.h"
@@ -64,9 +64,7 @@ std::optional<Wanted> wanted_scales(const std::vector<PoseLoop>& loops,
             fit_pose_space(parts[1], fit.poses, known, along).scales.logs(),
         1.0 / static_cast<double>(std::size(kSplits)), apart);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> missing(apart - wanted.covariance);
-  wanted.covariance += missing.eigenvectors() * missing.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                       missing.eigenvectors().transpose();
+  raise_to(apart, wanted.covariance);
   const auto with_noise_of = [&](double camera_share) {
     ScalesUnknown of = known;
     of.camera_share = camera_share;

@@ -57,12 +57,6 @@ double growth(const Matrix6d& less, const Matrix6d& more) {
   return std::max(1.0, less.ldlt().solve(more).trace() / 6);
 }
 
-void raise_to(const Matrix6d& least, Matrix6d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> missing(least - covariance);
-  covariance += missing.eigenvectors() * missing.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                missing.eigenvectors().transpose();
-}
-
 void tell_smooth_errors(Calibration& result, double grown) {
   constexpr double kTold = 1.5;  // of the deviations
   if (!result.pose_errors.found || grown < kTold * kTold) return;

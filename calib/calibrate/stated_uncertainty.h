@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Eigenvalues>
+
 #include "calib/calibrate/calibrate.h"
 
 namespace flash::calib {
@@ -13,7 +15,12 @@ double add_uncertainty(Calibration& result, const SystematicUncertainty& systema
 double growth(const Matrix6d& less, const Matrix6d& more);
 
 /// Adds what `least` has beyond `covariance`, direction by direction.
-void raise_to(const Matrix6d& least, Matrix6d& covariance);
+template <int n>
+void raise_to(const Eigen::Matrix<double, n, n>& least, Eigen::Matrix<double, n, n>& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, n, n>> missing(least - covariance);
+  covariance += missing.eigenvectors() * missing.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                missing.eigenvectors().transpose();
+}
 
 /// That errors which are found to change smoothly have raised the variances by `grown`.
 void tell_smooth_errors(Calibration& result, double grown);

@@ -120,12 +120,9 @@ std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, co
   return observations;
 }
 
-std::vector<Observation> with_scales(std::vector<Observation> pairs, double size, double focal_length) {
+std::vector<Observation> with_scales(std::vector<Observation> pairs, const SeenScales& scales) {
   for (Observation& pair : pairs)
-    for (Eigen::Isometry3d& T : pair.T_camera_target) {
-      T.translation() *= size;
-      T.translation().z() *= focal_length;
-    }
+    for (Eigen::Isometry3d& T : pair.T_camera_target) T = rescaled(T, scales);
   return pairs;
 }
 

@@ -7,6 +7,7 @@
 #include "calib/dataset/target.h"
 #include "calib/dataset/target_shape.h"
 #include "calib/geometry/closed_form.h"
+#include "calib/solve/pose_space.h"
 #include "data/camera/camera.h"
 
 namespace flash::calib {
@@ -40,9 +41,8 @@ std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, co
                                         const TargetShape& shape, std::vector<Observation> observations,
                                         double edge_offset = 0);
 
-/// Pairs of poses as seen of a target of that size over the stated one, with that focal length over the
-/// stated one.
-std::vector<Observation> with_scales(std::vector<Observation> pairs, double size, double focal_length);
+/// Pairs of poses as they are seen with these scales.
+std::vector<Observation> with_scales(std::vector<Observation> pairs, const SeenScales& scales);
 
 /// T_base_target (eye-in-hand) or T_gripper_target as the mean over the views, for a target that was moved
 /// since.

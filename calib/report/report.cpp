@@ -176,10 +176,10 @@ std::vector<std::string> next_steps(const Calibration& c) {
         std::abs(larger)));
   }
   if (c.focal_length && c.focal_length->far_off())
-    steps.push_back(sentence(
-        "Calibrate the lens and make the target's poses anew: its estimated focal length is %.4f of that "
-        "which they were made with.",
-        c.focal_length->wanted->estimate));
+    steps.push_back(
+        sentence("Calibrate the lens and make the target's poses anew: its estimated focal length is %.4f "
+                 "times that which they were made with.",
+                 c.focal_length->wanted->estimate));
   const double second = kDegrees * c.diversity.spread.y();
   if (c.along && !c.along->told)
     steps.emplace_back(

@@ -165,11 +165,14 @@ LinearLoop linear_loop(const PoseLoop& loop, const HandEyePoses& poses) {
 
 Eigen::Vector2d SeenScales::logs() const { return {std::log(size), std::log(focal_length)}; }
 
+Eigen::Isometry3d rescaled(Eigen::Isometry3d T_camera_target, const SeenScales& scales) {
+  T_camera_target.translation() *= scales.size;
+  T_camera_target.translation().z() *= scales.focal_length;
+  return T_camera_target;
+}
+
 std::vector<PoseLoop> rescaled(std::vector<PoseLoop> loops, const SeenScales& scales) {
-  for (PoseLoop& loop : loops) {
-    loop.C.translation() *= scales.size;
-    loop.C.translation().z() *= scales.focal_length;
-  }
+  for (PoseLoop& loop : loops) loop.C = rescaled(loop.C, scales);
   return loops;
 }
 

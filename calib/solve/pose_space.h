@@ -71,6 +71,7 @@ struct LinearLoop {
 LinearLoop linear_loop(const PoseLoop& loop, const HandEyePoses& poses);
 
 /// What is seen with other scales than the stated ones.
+Eigen::Isometry3d rescaled(Eigen::Isometry3d T_camera_target, const SeenScales& scales);
 std::vector<PoseLoop> rescaled(std::vector<PoseLoop> loops, const SeenScales& scales);
 
 }  // namespace flash::calib
