@@ -14,7 +14,7 @@ struct DetectSettings {
   int threads = 0;    ///< 0: as many as there are processors
   std::string cache;  ///< folder that keeps what was found, by content; empty: none
   std::function<void(const std::string&)> tell = {};  ///< of the cache: a full disk, once; edited files
-  FitSettings fit;
+  FitSettings fit = {};
 };
 
 /// Looks for the target in every picture of a set; a detection for each frame, in their order. Without

@@ -94,7 +94,9 @@ def main():
         _, two = program.synthesize(options.sysid, root / "two", "--noise", "0.001", "--hold", "bending=1e-4", seed=2)
 
         def answer(name, *words, asset=asset):
-            program.must(options.sysid, "grid", *words, "--asset", asset, *SEARCH, "-o", root / name)
+            # An answer that cannot be used (exit code 3) is one, too: on cells as coarse as these, some cannot.
+            run = program.call(options.sysid, "grid", *words, "--asset", asset, *SEARCH, "-o", root / name)
+            results.append((run.returncode in (0, 3), f"{name}: found exit code {run.returncode}, expected 0 or 3: {run.stderr.strip()[-200:]}"))
             return json.loads((root / name / "summary.json").read_text())
 
         def expect_same(what, expected, found, share):

@@ -5,9 +5,8 @@
 
 #include <limits>
 
-#include "sim/newton/active_set.h"
-#include "sim/newton/step_problem.h"
 #include "tests/sim/cuda/drawn_step.h"
+#include "tests/sim/cuda/processor_iterate.h"
 
 namespace flash::sim::cuda {
 namespace {
@@ -19,67 +18,11 @@ using Eigen::Vector3d;
 constexpr double epsilon = std::numeric_limits<double>::epsilon(),
                  single_epsilon = std::numeric_limits<float>::epsilon();
 
-/// The same by the processor.
-struct Processor {
-  std::shared_ptr<const SheetPlan> plan;
-  Environment environment;
-  StepProblem problem;
-  Iterate at;
-
-  explicit Processor(const DrawnStep& drawn)
-      : plan(drawn.plan), environment(begun(drawn)), problem(*plan, environment, drawn.h, {.speed = 1}) {
-    at.positions = drawn.positions;
-    Points carried = at.positions;
-    at.contacts = begin_step(problem.contacts, carried);
-    problem.evaluate(at);
-  }
-
-  const BodyLaw& law() const { return problem.laws.front(); }
-  double rigidity() const { return problem.potential.effective_rigidity(law()); }
-
-  /// The Hessian's blocks with those of contact, without quadratic bending.
-  BlockValues<double> blocks(bool positive) const {
-    BlockValues<double> values;
-    problem.potential.assemble(at.positions, positive ? Curvature::positive : Curvature::exact, false,
-                               values);
-    add_slip_stiffness(at.contacts, values);
-    if (!positive) add_surface_curvature(at.contacts, values);
-    return values;
-  }
-  Points product(const BlockValues<double>& values, const Points& x) const {
-    Points y = Points::Zero(x.rows(), 3);
-    const auto block = [&](std::size_t k) { return Eigen::Map<const Matrix3d>(values.data() + 9 * k); };
-    for (Eigen::Index i = 0; i < x.rows(); ++i)
-      y.row(i) += x.row(i) * block(static_cast<std::size_t>(i)).transpose();
-    for (std::size_t k = 0; k < plan->pattern.pairs.size(); ++k) {
-      const auto [row, column] = plan->pattern.pairs[k];
-      const auto own = block(static_cast<std::size_t>(plan->pattern.size) + k);
-      y.row(row) += x.row(column) * own.transpose();
-      y.row(column) += x.row(row) * own;
-    }
-    return y;
-  }
-  /// The largest entry of the matrix of the linear problem [N/m].
-  double stiffness() const {
-    const BlockValues<double> values = blocks(false);
-    double largest = rigidity() * law().bending.largest_entry;
-    for (const double entry : values) largest = std::max(largest, std::abs(entry));
-    return largest;
-  }
-
- private:
-  static Environment begun(const DrawnStep& drawn) {
-    Environment environment = drawn.environment;
-    update_holds(environment, environment.state.time + drawn.h);
-    return environment;
-  }
-};
-
 // Forces are positions, rounded, times stiffness, added up over some tens of neighbours.
 RC_GTEST_PROP(SerialPotential, ForcesAndEnergiesAreThoseOfTheProcessor, ()) {
   const DrawnStep drawn(draw_world);
   SerialReplay serial = drawn.serial();
-  const Processor processor(drawn);
+  const ProcessorIterate processor(drawn, drawn.positions);
   const SerialIterate own = serial.evaluate(drawn.positions);
   const Iterate& other = processor.at;
   const double rounded = 64 * epsilon * drawn.positions.cwiseAbs().maxCoeff() * processor.stiffness();
@@ -117,7 +60,7 @@ RC_GTEST_PROP(SerialPotential, ForcesAreTheSlopeOfThePotential, ()) {
 RC_GTEST_PROP(SerialPotential, TheMatrixIsThatOfTheProcessor, ()) {
   const DrawnStep drawn(draw_world);
   SerialReplay serial = drawn.serial();
-  const Processor processor(drawn);
+  const ProcessorIterate processor(drawn, drawn.positions);
   const Points x = draw_noise(drawn.positions.rows(), 1);
   for (const bool positive : {false, true}) {
     const Points own = serial.matrix_product(drawn.positions, positive, x),
@@ -145,7 +88,7 @@ RC_GTEST_PROP(SerialPotential, TheMatrixIsTheSlopeOfTheForces, ()) {
   };
   const Points once = slope(t), twice = slope(2 * t),
                product = serial.matrix_product(drawn.positions, false, way);
-  const double stiffness = Processor(drawn).stiffness(),
+  const double stiffness = ProcessorIterate(drawn, drawn.positions).stiffness(),
                rounded = 64 * epsilon * drawn.positions.cwiseAbs().maxCoeff() / t * stiffness +
                          150 * single_epsilon * stiffness;
   RC_ASSERT((once - product).cwiseAbs().maxCoeff() <= (twice - once).cwiseAbs().maxCoeff() + rounded);
@@ -156,7 +99,7 @@ RC_GTEST_PROP(SerialPotential, TheMatrixIsTheSlopeOfTheForces, ()) {
 RC_GTEST_PROP(SerialPotential, TheFactorIsThatOfTheRestrictedMatrix, ()) {
   const DrawnStep drawn(draw_world);
   SerialReplay serial = drawn.serial();
-  const Processor processor(drawn);
+  const ProcessorIterate processor(drawn, drawn.positions);
   BlockValues<double> values = processor.blocks(true);
   for (const BodyLaw& law : processor.problem.laws)
     add_bending_stand_in(law.bending, processor.problem.potential.effective_rigidity(law), values);
