@@ -345,6 +345,7 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   const int exit_code = solved.calibration.usable ? exit_done : exit_unusable;
   nlohmann::ordered_json json = calib::to_json(solved.calibration, inputs, exit_code);
   if (!options.parent.empty()) extrinsics.transform.parent = options.parent;
+  expect_frame_names(extrinsics.transform.parent, options.child);
   extrinsics.transform.child = options.child;
   json["transform"] = calib::to_json(extrinsics.transform);
   const std::string text = data::format_json(json);

@@ -104,6 +104,7 @@ void add_plan_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<PlanOptions>();
   CLI::App* verb = app.add_subcommand("plan", "The next robot poses that would help the calibration most");
   add_dataset_options(*verb, options->dataset);
+  verb->get_option("dataset")->description("Folder of pictures and poses");
   add_link_option(*verb, options->dataset);
   add_setup_option(*verb, options->setup);
   verb->add_option("--count", options->count, "Number of poses to propose")

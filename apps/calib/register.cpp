@@ -318,6 +318,15 @@ void warn_of_lenses(const std::vector<std::string>& files, const std::vector<cal
                 ": the camera's place differs between them by as much; without --without-images one "
                 "lens is taken for both"});
   }
+  constexpr double kApart = 0.01;  // twice what focal lengths that are stated are off by
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    const double first = calibrations.front().focal_length, other = calibrations[i].focal_length;
+    if (std::abs(other / first - 1) < kApart) continue;
+    doubts.add(files[i], {"is for a focal length of " + data::format_short(other) +
+                          " times that with which the target's poses were made, but " + files.front() +
+                          " for " + data::format_short(first) +
+                          ": one camera has one; calibrate its lens and make the poses of both with it"});
+  }
 }
 
 calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {

@@ -326,6 +326,9 @@ int run_validate(const CLI::App& verb, ValidateOptions options) {
   expect_own_files(files_written(dataset, options.out), read);
   expect_folder_apart(options.out, read);
   const bool pairs = dataset.frames.front().T_camera_target.has_value();
+  if (pairs && !options.lens.empty())
+    throw data::InputError("--lens: found " + options.lens + ", expected none: of pairs of poses, " +
+                           dataset.source + ", the lens has been used already");
   if (dataset.setup && *dataset.setup != extrinsics.setup)
     throw data::InputError(dataset.source + ": found " + calib::to_string(*dataset.setup) + ", expected " +
                            calib::to_string(extrinsics.setup) + " as in " + options.extrinsics);

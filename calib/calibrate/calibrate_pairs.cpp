@@ -153,7 +153,7 @@ void add_smooth_errors(Calibration& result, const std::vector<Observation>& obse
   result.covariance = smooth.covariance;
   raise_to(result.repeatable, result.covariance);
   const auto raise = [&](TargetSize& scale, Eigen::Index i) {
-    scale.sd = std::max(scale.sd, scale.estimate * std::sqrt(smooth.scales(i, i)));
+    if (scale.sd > 0) scale.sd = std::max(scale.sd, scale.estimate * std::sqrt(smooth.scales(i, i)));
   };
   raise(*result.size, 0);
   if (result.focal_length) raise(*result.focal_length, 1);
@@ -214,7 +214,8 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   result.covariance += by_scales * scales.covariance * by_scales.transpose();
   result.repeatable += by_scales * scales.repeatable * by_scales.transpose();
   add_smooth_errors(result, observations, loops, fit, scales, along);
-  result.covariance += std::pow(scales.kept_size_sd, 2) * by_scales.col(0) * by_scales.col(0).transpose();
+  const Eigen::Vector2d kept = scales.kept_sd.cwiseAbs2();
+  result.covariance += by_scales * kept.asDiagonal() * by_scales.transpose();
   check_halves(result, loops, places, along);
   finish(result, observations);
   tell_scales(result, loops, along, settings);

@@ -18,10 +18,9 @@ namespace {
 constexpr double kUsualSize = 0.01;    // standard deviation of what a size that is stated is off by
 constexpr double kUsualFocal = 0.005;  // of a focal length, as usual_lens_prior() has it
 constexpr double kUnknown = 0.1;       // a scale that is known to less is not told
-constexpr std::size_t kEnough = 8;     // pairs that tell their noise and a size together
+constexpr std::size_t kEnough = 8;     // pairs of which halves tell something
 
 double focal_length_sd(const CalibrateSettings& settings) {
-  if (settings.use == Use::two_arms && settings.lens == LensKnowledge::near) return 0;  // as of pictures
   switch (settings.lens) {
     case LensKnowledge::stated:
       return 0;
@@ -33,11 +32,41 @@ double focal_length_sd(const CalibrateSettings& settings) {
   return kUsualFocal;
 }
 
+/// An answer for arms that share a lens keeps it, as of pictures; what it may be off counts.
+bool keeps_shared_lens(const CalibrateSettings& settings) {
+  return settings.use == Use::two_arms && settings.lens == LensKnowledge::near;
+}
+
 /// What pairs want, and the covariance of its logs.
 struct Wanted {
   SeenScales scales;
   Eigen::Matrix2d covariance;
 };
+
+/// Of two answers that are as far apart, and as good: the variance about their middle.
+void add_apart(const Eigen::Vector2d& apart, double share, Eigen::Matrix2d& sum) {
+  sum += 0.25 * share * apart * apart.transpose();
+}
+
+/// What the halves of the robot's places do not agree on.
+Eigen::Matrix2d apart_by_halves(const std::vector<PoseLoop>& loops,
+                                const std::vector<Observation>& observations, const PoseSpaceFit& fit,
+                                const std::optional<AlongPrior>& along, const ScalesUnknown& known) {
+  std::vector<Eigen::Vector3d> places;
+  for (const Observation& observation : observations)
+    places.push_back(observation.T_base_gripper.translation());
+  Eigen::Matrix2d apart = Eigen::Matrix2d::Zero();
+  constexpr Split kSplits[] = {Split::consecutive, Split::place_1, Split::place_2, Split::place_3};
+  for (const Split split : kSplits) {
+    const std::vector<int> half = halves_of(places, split);
+    std::vector<PoseLoop> parts[2];
+    for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
+    add_apart(fit_pose_space(parts[0], fit.poses, known, along).scales.logs() -
+                  fit_pose_space(parts[1], fit.poses, known, along).scales.logs(),
+              1.0 / static_cast<double>(std::size(kSplits)), apart);
+  }
+  return apart;
+}
 
 /// With what the halves of the robot's places do not agree on, which none of them sees by itself, and with
 /// whose the noise is. None where the solution does not converge.
@@ -47,30 +76,18 @@ std::optional<Wanted> wanted_scales(const std::vector<PoseLoop>& loops,
   const PoseSpaceFit fit = fit_pose_space(loops, seed, known, along);
   if (!fit.converged) return std::nullopt;
   Wanted wanted{fit.scales, fit.covariance.bottomRightCorner<2, 2>()};
-  if (loops.size() < kEnough) return wanted;
-  std::vector<Eigen::Vector3d> places;
-  for (const Observation& observation : observations)
-    places.push_back(observation.T_base_gripper.translation());
-  const auto add = [](const Eigen::Vector2d& apart, double share, Eigen::Matrix2d& sum) {
-    sum += 0.25 * share * apart * apart.transpose();
-  };
-  Eigen::Matrix2d apart = Eigen::Matrix2d::Zero();
-  constexpr Split kSplits[] = {Split::consecutive, Split::place_1, Split::place_2, Split::place_3};
-  for (const Split split : kSplits) {
-    const std::vector<int> half = halves_of(places, split);
-    std::vector<PoseLoop> parts[2];
-    for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
-    add(fit_pose_space(parts[0], fit.poses, known, along).scales.logs() -
-            fit_pose_space(parts[1], fit.poses, known, along).scales.logs(),
-        1.0 / static_cast<double>(std::size(kSplits)), apart);
-  }
-  raise_to(apart, wanted.covariance);
+  // Few pairs tell their noise worse than a scale: at three deviations Student's t, of as many degrees of
+  // freedom as are left, is as much longer (Abramowitz and Stegun 26.7.5).
+  const auto left = static_cast<double>(6 * loops.size() - 14);
+  wanted.covariance *= std::pow(1 + 2.5 / left, 2);
+  if (loops.size() >= kEnough)
+    raise_to(apart_by_halves(loops, observations, fit, along, known), wanted.covariance);
   const auto with_noise_of = [&](double camera_share) {
     ScalesUnknown of = known;
     of.camera_share = camera_share;
     return fit_pose_space(loops, seed, of, along).scales.logs();
   };
-  add(with_noise_of(1) - with_noise_of(0), 1, wanted.covariance);
+  add_apart(with_noise_of(1) - with_noise_of(0), 1, wanted.covariance);
   return wanted;
 }
 
@@ -82,12 +99,21 @@ std::optional<TargetSize::Wanted> told(const std::optional<Wanted>& wanted, doub
   return TargetSize::Wanted{(*wanted).scales.*scale, (*wanted).scales.*scale * sd};
 }
 
+/// What was known of a number before, where it is found to be `log`: it has a long tail.
+double known_variance(double prior_sd, double log) { return prior_sd * prior_sd + log * log / kLensTail; }
+
 /// With one number known beforehand, about 0.
 void take_in(double prior_sd, Eigen::Index i, Eigen::Vector2d& logs, Eigen::Matrix2d& covariance) {
   if (!std::isfinite(prior_sd)) return;
-  const Eigen::Vector2d gain = covariance.col(i) / (covariance(i, i) + prior_sd * prior_sd);
+  const Eigen::Vector2d found = logs;
+  const double variance = covariance(i, i);
+  double known = known_variance(prior_sd, logs[i]);
+  constexpr int kTimes = 50;  // by which the tail has settled
+  for (int time = 0; time < kTimes; ++time)
+    known = known_variance(prior_sd, found[i] * known / (variance + known));
+  const Eigen::Vector2d gain = covariance.col(i) / (variance + known);
   const Eigen::RowVector2d row = covariance.row(i);
-  logs -= gain * logs[i];
+  logs -= gain * found[i];
   covariance -= gain * row;
 }
 
@@ -123,13 +149,43 @@ void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,
   tell_first(result, text, depends && !settings.size_as_stated);
 }
 
+/// One that was kept as it is stated, where the pairs want another.
+void tell_kept_focal_length(Calibration& result, const Vector6d& away, const CalibrateSettings& settings) {
+  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom, as of the lens of pictures
+  const TargetSize::Wanted& wanted = *result.focal_length->wanted;
+  const bool shared = keeps_shared_lens(settings),
+             depends = away.dot(result.covariance.ldlt().solve(away)) > kChiSquare999;
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "the camera's focal length is %.4g times (+- %.2g, 2 sd) that with which the target's poses "
+                "were made; the "
+                "stated one was kept%s, and with the other the camera is %.1f mm and %.2f deg from where it "
+                "is here: %s",
+                wanted.estimate, 2 * wanted.sd, shared ? ", as arms on one camera share it" : "",
+                1e3 * away.head<3>().norm(), away.tail<3>().norm() * 180 / M_PI,
+                shared ? "calibrate the lens and make the poses anew" : "leave --lens stated out");
+  if (shared) result.covariance += away * away.transpose();
+  tell_first(result, text, depends && !shared);
+}
+
 void tell_focal_length(Calibration& result, const std::vector<PoseLoop>& loops,
-                       const std::optional<AlongPrior>& along) {
-  if (!result.focal_length || !result.focal_length->far_off()) return;
+                       const std::optional<AlongPrior>& along, const CalibrateSettings& settings) {
+  if (!result.focal_length) return;
   const TargetSize& focal = *result.focal_length;
-  const Vector6d away = camera_with(result, loops, along,
-                                    {.focal_length = focal.wanted->estimate / focal.estimate}),
-                 as_stated = camera_with(result, loops, along, {.focal_length = 1 / focal.estimate});
+  if (settings.lens == LensKnowledge::unknown && !focal.wanted) {
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "the pairs do not tell the camera's focal length: the answer counts it as known to %.0f %%; add "
+        "views, or leave --lens solved out",
+        100 * focal.prior_sd);
+    tell_first(result, text);
+  }
+  if (!focal.far_off()) return;
+  const Vector6d away =
+      camera_with(result, loops, along, {.focal_length = focal.wanted->estimate / focal.estimate});
+  if (focal.sd == 0) return tell_kept_focal_length(result, away, settings);
+  const Vector6d as_stated = camera_with(result, loops, along, {.focal_length = 1 / focal.estimate});
   char text[400];
   std::snprintf(
       text, sizeof text,
@@ -150,58 +206,50 @@ PairScales settle_scales(std::vector<PoseLoop>& loops, const std::vector<Observa
                          const CalibrateSettings& settings) {
   PairScales scales{.size = {.prior_sd = settings.target_size_sd.value_or(kUsualSize)}};
   TargetSize& size = scales.size;
-  // A tracker's poses are seen along no axis.
-  const double focal_sd = unseen_targets(observations).plainly() ? 0 : focal_length_sd(settings);
   const double unknown = std::numeric_limits<double>::infinity();
-  const bool enough = loops.size() >= kEnough;
-  std::optional<Wanted> any_size;
-  if (enough) {
-    any_size =
-        wanted_scales(loops, observations, seed, along, {.size_sd = unknown, .focal_length_sd = focal_sd});
-    size.wanted = told(any_size, &SeenScales::size, 0);
-  }
+  const bool seen = !unseen_targets(observations).plainly();  // a tracker's poses are seen along no axis
+  const auto wanted = [&](double size_sd, double focal_sd) {
+    return wanted_scales(loops, observations, seed, along, {.size_sd = size_sd, .focal_length_sd = focal_sd});
+  };
+  TargetSize focal{.prior_sd = seen ? focal_length_sd(settings) : 0};
+  if (seen) focal.wanted = told(wanted(unknown, unknown), &SeenScales::focal_length, 1);
+  if (std::isinf(focal.prior_sd) && !focal.wanted) focal.prior_sd = kUnknown;
+  const bool focal_kept = keeps_shared_lens(settings), focal_solved = focal.prior_sd > 0 && !focal_kept;
+  const double focal_sd = focal_solved ? focal.prior_sd : 0;
+  const std::optional<Wanted> any_size = wanted(unknown, focal_sd);
+  size.wanted = told(any_size, &SeenScales::size, 0);
   if (std::isinf(size.prior_sd) && !size.wanted)
     throw data::InputError(
         "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
         "out, or add views farther apart");
   const bool solved = size.prior_sd > 0 && !settings.size_as_stated;
-  if (settings.size_as_stated && std::isfinite(size.prior_sd)) scales.kept_size_sd = size.prior_sd;
-  if (focal_sd > 0) {
-    TargetSize& focal = scales.focal_length.emplace(TargetSize{.prior_sd = focal_sd});
-    if (enough)
-      focal.wanted = told(
-          wanted_scales(loops, observations, seed, along, {.size_sd = unknown, .focal_length_sd = unknown}),
-          &SeenScales::focal_length, 1);
-    if (std::isinf(focal_sd) && !focal.wanted) scales.focal_length.reset();
-  }
-  if (!solved && !scales.focal_length) return scales;
-  // Of few pairs, and of those that do not tell a size, what is known weighs as much as they do. A size that
-  // is kept does not bend the focal length.
+  if (settings.size_as_stated && std::isfinite(size.prior_sd)) scales.kept_sd[0] = size.prior_sd;
+  if (focal_kept) scales.kept_sd[1] = focal.prior_sd;
+  // Of pairs that do not tell a size, what is known weighs as much as they do. A size that is kept does not
+  // bend the focal length.
   const bool by_pairs = size.wanted.has_value();
-  const std::optional<Wanted> found =
-      by_pairs
-          ? any_size
-          : wanted_scales(loops, observations, seed, along,
-                          {.size_sd = size.prior_sd, .focal_length_sd = scales.focal_length ? focal_sd : 0});
-  if (!found) return scales;
-  Eigen::Vector2d logs = found->scales.logs();
-  scales.covariance = found->covariance;
-  if (solved) {
-    if (by_pairs) take_in(size.prior_sd, 0, logs, scales.covariance);
-    size.estimate = std::exp(logs[0]);
-    size.sd = size.estimate * std::sqrt(scales.covariance(0, 0));
-    scales.information[0] = std::pow(size.prior_sd, -2);
-  } else {
-    scales.covariance.row(0).setZero();
-    scales.covariance.col(0).setZero();
+  const std::optional<Wanted> found = by_pairs ? any_size : wanted(size.prior_sd, focal_sd);
+  if (found && (solved || focal_solved)) {
+    Eigen::Vector2d logs = found->scales.logs();
+    scales.covariance = found->covariance;
+    if (solved) {
+      if (by_pairs) take_in(size.prior_sd, 0, logs, scales.covariance);
+      size.estimate = std::exp(logs[0]);
+      size.sd = size.estimate * std::sqrt(scales.covariance(0, 0));
+      scales.information[0] = 1 / known_variance(size.prior_sd, logs[0]);
+    } else {
+      scales.covariance.row(0).setZero();
+      scales.covariance.col(0).setZero();
+    }
+    if (focal_solved) {
+      focal.estimate = std::exp(logs[1]);
+      focal.sd = focal.estimate * std::sqrt(scales.covariance(1, 1));
+      scales.information[1] = 1 / known_variance(focal.prior_sd, logs[1]);
+    }
+    scales.repeatable =
+        scales.covariance - scales.covariance * scales.information.asDiagonal() * scales.covariance;
   }
-  if (scales.focal_length) {
-    scales.focal_length->estimate = std::exp(logs[1]);
-    scales.focal_length->sd = scales.focal_length->estimate * std::sqrt(scales.covariance(1, 1));
-    scales.information[1] = 1 / (focal_sd * focal_sd * (1 + std::pow(logs[1] / focal_sd, 2) / kLensTail));
-  }
-  scales.repeatable =
-      scales.covariance - scales.covariance * scales.information.asDiagonal() * scales.covariance;
+  if (focal_solved || (seen && focal.far_off())) scales.focal_length = focal;
   loops = rescaled(std::move(loops), scales.estimate());
   return scales;
 }
@@ -224,7 +272,7 @@ Eigen::Matrix<double, 6, 2> camera_by_scales(const std::vector<PoseLoop>& loops,
 
 void tell_scales(Calibration& result, const std::vector<PoseLoop>& loops,
                  const std::optional<AlongPrior>& along, const CalibrateSettings& settings) {
-  tell_focal_length(result, loops, along);
+  tell_focal_length(result, loops, along, settings);
   tell_size(result, loops, along, settings);
 }
 

@@ -11,12 +11,13 @@ namespace flash::calib {
 /// Size of the target and focal length of the camera that saw it, of pairs of poses.
 struct PairScales {
   TargetSize size;
-  std::optional<TargetSize> focal_length = {};  ///< told as a size is; none: it counts as exact
+  /// Told as a size is. None: it is kept, and the pairs do not exclude it, or no camera saw the targets.
+  std::optional<TargetSize> focal_length = {};
   Eigen::Matrix2d covariance =
       Eigen::Matrix2d::Zero();  ///< of the logs of both, of those that are solved for
   Eigen::Matrix2d repeatable = Eigen::Matrix2d::Zero();  ///< likewise, of what another recording would change
   Eigen::Vector2d information = Eigen::Vector2d::Zero();  ///< of what was known beforehand of each
-  double kept_size_sd = 0;                                ///< of a size that is kept: what it may be off
+  Eigen::Vector2d kept_sd = Eigen::Vector2d::Zero();      ///< of those that are kept: what they may be off
 
   SeenScales estimate() const;
 };

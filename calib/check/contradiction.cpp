@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "calib/geometry/pose.h"
+#include "calib/solve/pose_space.h"
 #include "data/files/text.h"
 #include "data/numbers/median.h"
 
@@ -41,36 +42,49 @@ std::string moved_by(const Eigen::Isometry3d& before, const Eigen::Isometry3d& n
   return text;
 }
 
-/// The target in another size, wherever these views want it.
-struct ResizedTarget {
-  double size = 1;  ///< over that for which the views have poses
+/// The target as it is seen with another size or focal length, wherever these views want it.
+struct Rescaled {
+  double scale = 1;  ///< over that for which the views have poses
   Eigen::Isometry3d Z;
   std::vector<Observation> observations;  ///< with poses of it
 };
 
-/// By least squares of the target's place over the views, T_i(s) = (R_i, s t_i). None where turns alone leave
-/// the size open.
-std::optional<ResizedTarget> resized_target(Setup setup, const Eigen::Isometry3d& X,
-                                            const std::vector<Observation>& observations) {
+/// `scale`: what is free of `with(scale)`, which is linear in places. By least squares of the target's place
+/// over the views. None where turns alone leave it open.
+std::optional<Rescaled> rescaled_target(Setup setup, const Eigen::Isometry3d& X,
+                                        const std::vector<Observation>& observations,
+                                        double SeenScales::*scale) {
+  const auto with = [&](const Eigen::Isometry3d& seen, double value) {
+    SeenScales scales;
+    scales.*scale = value;
+    return rescaled(seen, scales);
+  };
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
   Eigen::Vector4d right = Eigen::Vector4d::Zero();
   for (const Observation& view : observations) {
     if (view.T_camera_target.empty()) continue;
     const PoseLoop loop = pose_loop(setup, view.T_base_gripper, view.T_camera_target.front());
     const Eigen::Isometry3d T_fixed_camera = loop.G * X;
+    const Eigen::Vector3d once = with(loop.C, 1).translation(), slope = with(loop.C, 2).translation() - once;
     Eigen::Matrix<double, 3, 4> rows;
-    rows << -Eigen::Matrix3d::Identity(), T_fixed_camera.linear() * loop.C.translation();
+    rows << -Eigen::Matrix3d::Identity(), T_fixed_camera.linear() * slope;
     normal += rows.transpose() * rows;
-    right -= rows.transpose() * T_fixed_camera.translation();
+    right -= rows.transpose() * (T_fixed_camera * (once - slope));
   }
   const Eigen::LDLT<Eigen::Matrix4d> solver(normal);
-  const double size = solver.solve(right)[3];
-  if (!(solver.rcond() > 1e-9 && size > 0)) return std::nullopt;
-  ResizedTarget result{size, {}, observations};
+  const double found = solver.solve(right)[3];
+  if (!(solver.rcond() > 1e-9 && found > 0)) return std::nullopt;
+  Rescaled result{found, {}, observations};
   for (Observation& view : result.observations)
-    for (Eigen::Isometry3d& pose : view.T_camera_target) pose.translation() *= size;
+    for (Eigen::Isometry3d& pose : view.T_camera_target) pose = with(pose, found);
   result.Z = target_pose_from(setup, X, result.observations);
   return result;
+}
+
+/// Of pairs of poses, whose corners nobody has.
+bool are_pairs(const std::vector<Observation>& observations) {
+  return std::all_of(observations.begin(), observations.end(),
+                     [](const Observation& view) { return view.points.empty(); });
 }
 
 /// The view from which on all miss, where all before it do not.
@@ -120,17 +134,29 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
       target_is_refitted && seen.size() >= 3
           ? shah(pose_loops(extrinsics.setup, seen))
           : HandEyePoses{camera_pose_from(extrinsics.setup, poses.Z, observations), poses.Z};
-  const std::optional<ResizedTarget> resized = resized_target(extrinsics.setup, poses.X, observations);
+  const std::optional<Rescaled> resized =
+      rescaled_target(extrinsics.setup, poses.X, observations, &SeenScales::size);
+  const std::optional<Rescaled> refocused =
+      are_pairs(observations)
+          ? rescaled_target(extrinsics.setup, poses.X, observations, &SeenScales::focal_length)
+          : std::nullopt;
   const double by_target = target_is_refitted ? result.ratio : ratio_at(target_moved, observations),
                by_camera = ratio_at(camera_moved, observations),
-               by_size =
-                   resized ? ratio_at({poses.X, resized->Z}, resized->observations, resized->size) : INFINITY;
+               by_size = resized ? ratio_at({poses.X, resized->Z}, resized->observations, resized->scale)
+                                 : INFINITY,
+               by_lens = refocused ? ratio_at({poses.X, refocused->Z}, refocused->observations) : INFINITY;
   std::string cause;
   if (by_target <= kContradicts && by_target <= by_camera)
     cause = "the target is not where it was at the calibration, " + moved_by(poses.Z, target_moved.Z) +
             ": these views cannot check the calibration; --refit-target takes its place from them";
+  else if (by_lens <= kContradicts && by_lens <= by_size && by_lens <= by_camera)
+    cause =
+        "the camera's focal length is " + data::format_short(refocused->scale * extrinsics.focal_length) +
+        " times that with which these poses were made, and was " +
+        data::format_short(extrinsics.focal_length) +
+        " times at the calibration: poses made with another lens; these views cannot check the calibration";
   else if (by_size <= kContradicts && by_size <= by_camera)
-    cause = "the target is " + data::format_short(resized->size * extrinsics.target.scale) +
+    cause = "the target is " + data::format_short(resized->scale * extrinsics.target.scale) +
             " times as large as stated, and was " + data::format_short(extrinsics.target.scale) +
             " times at the calibration: another print, or another size stated; these views cannot check the "
             "calibration: measure a square";

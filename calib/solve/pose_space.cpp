@@ -93,13 +93,13 @@ Gram known_before(const PoseSpaceFit& fit, const std::optional<ScalesUnknown>& s
   };
   const Eigen::Vector2d logs = fit.scales.logs();
   for (const int column : free_scales(scales)) {
-    const bool of_lens = column > kPoses;
-    const double sd = of_lens ? scales->focal_length_sd : scales->size_sd, off = logs[column - kPoses] / sd;
+    const double sd = column > kPoses ? scales->focal_length_sd : scales->size_sd,
+                 off = logs[column - kPoses] / sd;
     if (!std::isfinite(sd)) continue;
     Eigen::Matrix<double, 1, kColumns> row = Eigen::Matrix<double, 1, kColumns>::Zero();
     row[column] = 1 / sd;
     row[kColumns - 1] = off;
-    add(row, of_lens ? 1 / (1 + off * off / kLensTail) : 1);
+    add(row, 1 / (1 + off * off / kLensTail));
   }
   if (known) {
     const AlongResidual residual = along_residual(*known, known->target ? fit.poses.Z : fit.poses.X);

@@ -38,7 +38,7 @@ struct PoseSpaceFit {
 };
 
 /// Scales as unknowns, each with the standard deviation of what it is off by; 0: it is as stated, infinity:
-/// nothing is known. That of a focal length has the long tail of LensPrior.
+/// nothing is known. What is known has the long tail of LensPrior.
 struct ScalesUnknown {
   double size_sd = std::numeric_limits<double>::infinity();
   double focal_length_sd = 0;

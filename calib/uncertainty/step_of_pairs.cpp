@@ -6,6 +6,8 @@
 #include <numeric>
 #include <random>
 
+#include "data/numbers/median.h"
+
 namespace flash::calib {
 namespace {
 
@@ -40,6 +42,25 @@ StepOfPairs likeliest_step(const Scatter& sequence, const Matrix6d& total) {
   return best;
 }
 
+/// Of each component by itself.
+Vector6d median_of(Scatter::const_iterator begin, Scatter::const_iterator end) {
+  Vector6d medians;
+  for (Eigen::Index c = 0; c < 6; ++c) {
+    std::vector<double> values;
+    for (auto one = begin; one != end; ++one) values.push_back((*one)[c]);
+    medians[c] = data::median(std::move(values));
+  }
+  return medians;
+}
+
+/// Whether more than outliers moved.
+bool medians_move(const Scatter& sequence, const StepOfPairs& step) {
+  const auto since = sequence.begin() + static_cast<std::ptrdiff_t>(step.first);
+  const Vector6d medians = median_of(since, sequence.end()) - median_of(sequence.begin(), since);
+  return medians.head<3>().norm() > 0.5 * step.motion.head<3>().norm() ||
+         medians.tail<3>().norm() > 0.5 * step.motion.tail<3>().norm();
+}
+
 std::optional<StepOfPairs> step_of(const Scatter& sequence) {
   constexpr int kOrders = 100, kChance = 2;
   constexpr double kGain = 20;
@@ -57,24 +78,45 @@ std::optional<StepOfPairs> step_of(const Scatter& sequence) {
     for (std::size_t i = other.size(); i > 1; --i) std::swap(other[i - 1], other[random() % i]);
     as_likely += likeliest_step(other, total).gain >= step.gain;
   }
-  if (!(step.gain > kGain) || as_likely > kChance) return std::nullopt;
+  if (!(step.gain > kGain) || as_likely > kChance || !medians_move(sequence, step)) return std::nullopt;
   return step;
+}
+
+/// Past the last of the pairs from `first` on for which the robot stood still.
+std::size_t end_of_pose(const std::vector<PoseLoop>& loops, std::size_t first) {
+  constexpr double kStill = 1e-5;  // [m], [rad]: what a robot reports anew where it stands
+  std::size_t end = first + 1;
+  while (end < loops.size() && motion_between(loops[first].G, loops[end].G).cwiseAbs().maxCoeff() < kStill)
+    ++end;
+  return end;
 }
 
 }  // namespace
 
 std::optional<StepOfPairs> step_of_pairs(const std::vector<PoseLoop>& loops, const HandEyePoses& poses) {
   constexpr std::size_t kFewest = 10;
-  if (loops.size() < kFewest) return std::nullopt;
   Scatter of_camera, of_target;
-  for (const PoseLoop& loop : loops) {
-    of_camera.push_back(motion_between(poses.X, loop.G.inverse() * poses.Z * loop.C.inverse()));
-    of_target.push_back(motion_between(poses.Z, loop.G * poses.X * loop.C));
+  std::vector<std::size_t> firsts;  // of the pairs that count as one
+  for (std::size_t i = 0; i < loops.size();) {
+    const std::size_t end = end_of_pose(loops, i);
+    firsts.push_back(i);
+    Vector6d camera = Vector6d::Zero(), target = Vector6d::Zero();
+    for (const std::size_t first = i; i < end; ++i) {
+      const PoseLoop& loop = loops[i];
+      const auto share = 1 / static_cast<double>(end - first);
+      camera += share * motion_between(poses.X, loop.G.inverse() * poses.Z * loop.C.inverse());
+      target += share * motion_between(poses.Z, loop.G * poses.X * loop.C);
+    }
+    of_camera.push_back(camera);
+    of_target.push_back(target);
   }
+  if (firsts.size() < kFewest) return std::nullopt;
   std::optional<StepOfPairs> step = step_of(of_camera);
   std::optional<StepOfPairs> other = step_of(of_target);
   if (other) other->of_target = true;
-  return !step || (other && other->gain > step->gain) ? other : step;
+  if (!step || (other && other->gain > step->gain)) step = other;
+  if (step) step->first = firsts[step->first];
+  return step;
 }
 
 }  // namespace flash::calib

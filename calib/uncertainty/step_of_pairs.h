@@ -19,8 +19,10 @@ struct StepOfPairs {
 };
 
 /// What each pair by itself makes of X, beside `poses`, is taken as normal about one mean, or about one
-/// before a pair and another since, with one covariance (Hotelling 1931). A step costs log n an unknown
-/// (Schwarz 1978). It has to gain 20, and more than all but two of a hundred other orders of the pairs do.
+/// before a pair and another since, with one covariance (Hotelling 1931). Pairs of one pose of the robot, one
+/// after the other, count as one. A step costs log n an unknown (Schwarz 1978). It has to gain 20, and more
+/// than all but two of a hundred other orders of the pairs do; and the medians have to move by half as far as
+/// the means, which outliers alone can move.
 /// Likewise of Z: of the two the likelier. Empty where nothing moved, and of fewer than ten pairs, which do
 /// not tell a covariance.
 std::optional<StepOfPairs> step_of_pairs(const std::vector<PoseLoop>& loops, const HandEyePoses& poses);

@@ -3,9 +3,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 
 #include "data/files/error.h"
 #include "data/files/npz.h"
+#include "data/files/text.h"
 #include "data/motion/pose_numbers.h"
 
 namespace flash::data {
@@ -77,12 +79,17 @@ std::vector<std::vector<double>> joined(const std::vector<std::vector<double>>& 
 }
 
 /// Rotations as matrices or, as OpenCV has them too, as vectors along their axes, of their angles' lengths.
-std::vector<std::vector<double>> rotations_in(const NumpyArray& array) {
+std::vector<std::vector<double>> rotations_in(const NumpyArray& array, const char* name,
+                                              const std::string& path) {
+  constexpr double longest = 4 * M_PI;  // a full turn, and what a driver counts on
   if (std::vector<std::vector<double>> matrices = rows_of(array, 9); !matrices.empty()) return matrices;
   std::vector<std::vector<double>> rows = rows_of(array, 3);
   for (std::vector<double>& row : rows) {
     const Eigen::Vector3d vector(row[0], row[1], row[2]);
     const double angle = vector.stableNorm();
+    if (!(angle <= longest))
+      throw input_error(path, "R_" + std::string(name + 1),
+                        "found a rotation vector of length " + format_short(angle) + ", expected radians");
     const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R =
         angle > 0 ? Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix() : Eigen::Matrix3d::Identity();
     row.assign(R.data(), R.data() + 9);
@@ -99,12 +106,12 @@ std::vector<std::vector<double>> poses_in(const NumpyArray& array) {
 
 /// The poses of one of the two stacks, as numbers; empty where there is none.
 std::vector<std::vector<double>> stack_of(const Arrays& arrays, Names names, const char* rotation,
-                                          const char* place) {
+                                          const char* place, const std::string& path) {
   if (const NumpyArray* whole = find(arrays, names))
     if (std::vector<std::vector<double>> rows = poses_in(*whole); !rows.empty()) return rows;
   const NumpyArray *R = find(arrays, {rotation}), *t = find(arrays, {place});
   if (R == nullptr || t == nullptr) return {};
-  return joined(rotations_in(*R), rows_of(*t, 3));
+  return joined(rotations_in(*R, rotation, path), rows_of(*t, 3));
 }
 
 bool is_of_poses(const std::string& name) {
@@ -144,7 +151,7 @@ PoseList in_order(const std::vector<std::vector<double>>& rows, const std::strin
 
 PoseList load_npz_poses(const std::string& path) {
   const Arrays named = load_npz(path), arrays = renamed(named, path);
-  std::vector<std::vector<double>> rows = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base");
+  std::vector<std::vector<double>> rows = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base", path);
   if (rows.empty() && arrays.size() == 1) rows = poses_in(arrays.begin()->second);
   if (rows.empty())
     throw InputError(path + ": found " + described(named) +
@@ -164,8 +171,8 @@ PoseList load_npy_poses(const std::string& path) {
 
 std::vector<PosePair> load_npz_pairs(const std::string& path) {
   const Arrays named = load_npz(path), arrays = renamed(named, path);
-  const auto robot = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base"),
-             target = stack_of(arrays, kTarget, "rtarget2cam", "ttarget2cam");
+  const auto robot = stack_of(arrays, kRobot, "rgripper2base", "tgripper2base", path),
+             target = stack_of(arrays, kTarget, "rtarget2cam", "ttarget2cam", path);
   if (robot.empty() || robot.size() != target.size())
     throw InputError(
         path + ": found " + described(named) +

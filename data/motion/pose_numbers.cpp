@@ -32,11 +32,19 @@ std::string not_a_rotation(const Eigen::Matrix3d& matrix) {
          ", expected 0";
 }
 
+void expect_finite(const Eigen::Ref<const Eigen::VectorXd>& numbers, const std::string& path,
+                   const std::string& where) {
+  for (const double number : numbers)
+    if (!std::isfinite(number))
+      throw input_error(path, where, "found " + format_short(number) + ", expected a number");
+}
+
 }  // namespace
 
 Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vector4d& xyzw,
                           const std::string& path, const std::string& where) {
-  if (std::abs(xyzw.norm() - 1) > 1e-3)
+  expect_finite(translation, path, where);
+  if (!(std::abs(xyzw.norm() - 1) <= 1e-3))
     throw input_error(path, where,
                       "quaternion has length " + format_short(xyzw.norm()) + ", expected 1 (order x y z w)");
   Eigen::Matrix<double, 7, 1> row;
@@ -47,7 +55,8 @@ Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vecto
 Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path, const std::string& where) {
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   const double off = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm();
-  if ((matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6)
+  expect_finite(matrix.topRightCorner<3, 1>(), path, where);
+  if (!((matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() <= 1e-6))
     throw input_error(path, where, "expected a rotation and a translation as 4 x 4, last row 0 0 0 1");
   if (!(off < 1e-3) || rotation.determinant() < 0) throw input_error(path, where, not_a_rotation(rotation));
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -72,6 +81,7 @@ Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.linear() = rotation_from_vector({values[3], values[4], values[5]});
     pose.translation() << values[0], values[1], values[2];
+    expect_finite(Eigen::Map<const Eigen::Matrix<double, 6, 1>>(values.data()), path, where);
     return pose;
   }
   throw input_error(path, where,

@@ -9,6 +9,8 @@
 
 namespace flash::sim::cuda {
 
+inline constexpr double epsilon = 2.220446049250313e-16;  ///< of double precision
+
 // What one implicit Euler step minimizes, as sim/step/incremental_potential.h, with what holds vertices.
 
 /// One step of an environment as a problem. The threads of a block have it in common.
@@ -225,7 +227,6 @@ template <typename Kind>
 __device__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
                                           const ContactSet* line, int i, const Triple& point,
                                           const Triple& force) {
-  constexpr double epsilon = 2.220446049250313e-16;
   const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
   const Triple start = triple(step.start[i]);
   VertexTouch touches[Kind::most];
@@ -268,7 +269,8 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
                                                     double* partial) {
   double* force = at.force;
   const Point* positions = at.positions;
-  const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
+  const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h,
+               stiffness = step.material->largest_stiffness * (1 + step.material->stiffness_damping / step.h);
   enum { potential, residual, friction, line_friction, rounding, count };
   double sums[count], worst = 0;
   sum_over_team(tables.size, sums, partial, [&](int i, double(&added)[count]) {
@@ -282,12 +284,12 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
     force[3 * i + 1] = own.y;
     force[3 * i + 2] = own.z;
     Triple reaction = step.held_part(i, own);
-    double uncertain = 0;
+    double uncertain = epsilon * norm(point) * (stiffness + mass * per_step);
     if constexpr (Kind::most > 0)
       if (step.held_axes[i] == 0) {
         const ContactResponse contact = update_contact<Kind>(step, at.contacts, line, i, point, own);
         reaction = contact.reaction;
-        uncertain = contact.rounding;
+        uncertain += contact.rounding;
         added[friction] += contact.friction;
         added[line_friction] += contact.line_friction;
       }
@@ -315,7 +317,6 @@ struct SpringSums {
 /// Adds what springs need against them to the forces.
 __device__ inline __noinline__ SpringSums pull_by_springs(const SheetTables& tables, const StepProblem& step,
                                                           const Iterate& at, double* partial) {
-  constexpr double epsilon = 2.220446049250313e-16;
   enum { potential, rounding, count };
   double sums[count], worst = 0;
   const Springs& springs = step.springs;
@@ -374,8 +375,8 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
 }
 
 /// Whether |r| <= tolerance |M g|, and no vertex misses its weight by more than 30 times as much. The
-/// rounding of positions turns the friction of a vertex that starts to slide, and stretches the springs of
-/// holds: that much more may be missing, of springs the most of them at each vertex.
+/// rounding of positions changes inertia, elastic forces, the springs of holds and the friction of a vertex
+/// that starts to slide: that much more may be missing, of springs the most of them at each vertex.
 __device__ inline bool balanced(const StepProblem& step, const Iterate& at, double tolerance) {
   return at.worst <= vertex_tolerance * tolerance &&
          at.residual <= tolerance * step.material->force_scale + at.rounding;

@@ -21,9 +21,10 @@ struct ReplayMaterial {
   SheetLame lame, damping;  ///< `damping` as `lame`, but for the law that has no lambda
   double membrane_stiffness, rigidity, areal_density, air_drag, stiffness_damping;  ///< as in SheetMaterial
   double gravity[3];                                                                ///< [m/s^2]
-  double weight_factor;     ///< |gravity|, 9.81 without [m/s^2]
-  double force_scale;       ///< |M g| [N]
-  double bending_rounding;  ///< of the energies of bending at both ends of a step [J]
+  double weight_factor;      ///< |gravity|, 9.81 without [m/s^2]
+  double force_scale;        ///< |M g| [N]
+  double largest_stiffness;  ///< as in sim/step/body_law.h, without damping [N/m]
+  double bending_rounding;   ///< of the energies of bending at both ends of a step [J]
   int obstacle_count;
   bool several;  ///< whether a box stands beside another obstacle
 };

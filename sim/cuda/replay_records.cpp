@@ -2,6 +2,7 @@
 
 #include "sim/law/membrane.h"
 #include "sim/newton/step_numbers.h"
+#include "sim/step/body_law.h"
 #include "sim/step/moving_obstacles.h"
 
 namespace flash::sim::cuda {
@@ -12,6 +13,7 @@ ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& envir
   const data::SheetMaterial& m = environment.material;
   const SheetLame lame = sheet_lame(m.membrane_stiffness, m.poissons_ratio);
   const Membrane membrane = membrane_of(m.constitutive, lame);
+  const BendingOperator& bending = bending_operator(plan, m);
   const double gravity = environment.gravity.norm(),
                weight_factor = gravity > 0 ? gravity : weight_of_nothing;
   return {.law = membrane.law,
@@ -25,7 +27,8 @@ ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& envir
           .gravity = {environment.gravity.x(), environment.gravity.y(), environment.gravity.z()},
           .weight_factor = weight_factor,
           .force_scale = m.areal_density * plan.sheet.vertex_area.norm() * weight_factor,
-          .bending_rounding = 2 * m.bending_rigidity * bending_operator(plan, m).flat_energy,
+          .largest_stiffness = largest_stiffness(plan.bodies.front(), m, bending),
+          .bending_rounding = 2 * m.bending_rigidity * bending.flat_energy,
           .obstacle_count = static_cast<int>(environment.obstacles.size()),
           .several = stand_beside(environment.obstacles)};
 }

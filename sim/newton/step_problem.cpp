@@ -22,18 +22,21 @@ std::vector<bool> carried_vertices(const ContactSet& contacts) {
 
 }  // namespace
 
-StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
+StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double h,
                          const WayOut<double>& way_out, LayerMemory* memory)
     : laws(body_laws(plan, environment)),
-      potential(plan, laws, environment, time_step),
-      contacts(plan.sheet, environment, time_step, way_out),
-      gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : weight_of_nothing) {
-  for (const BodyLaw& law : laws)
+      potential(plan, laws, environment, h),
+      contacts(plan.sheet, environment, h, way_out),
+      gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : weight_of_nothing),
+      time_step(h) {
+  for (const BodyLaw& law : laws) {
     force_scales.push_back(rows_of(law.place.body, potential.mass()).norm() * gravity);
+    stiffnesses.push_back(largest_stiffness(law, h));
+  }
   if (memory == nullptr) return;
   data::Points positions = environment.state.positions;
-  layers = std::make_unique<LayerStep>(*memory, environment, time_step,
-                                       carried_vertices(begin_step(contacts, positions)));
+  layers =
+      std::make_unique<LayerStep>(*memory, environment, h, carried_vertices(begin_step(contacts, positions)));
 }
 
 double StepProblem::relative_residual(const Iterate& iterate) const {
@@ -67,8 +70,9 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
     double squared_rounding = 0;
     for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i) {
       const VertexConstraint* c = iterate.contacts.find(i);
-      const double stiffness =
-          (c == nullptr ? 0 : norm(c->slip_stiffness)) + potential.spring_stiffness().row(i).norm();
+      const double stiffness = stiffnesses[b] + potential.mass()[i] / (time_step * time_step) +
+                               (c == nullptr ? 0 : norm(c->slip_stiffness)) +
+                               potential.spring_stiffness().row(i).norm();
       const double rounding =
           std::numeric_limits<double>::epsilon() * iterate.positions.row(i).norm() * stiffness;
       if (!(iterate.residual.row(i).norm() <=

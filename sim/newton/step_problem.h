@@ -29,12 +29,14 @@ struct StepProblem {
   ContactStep contacts;
   double gravity;                     ///< [m/s^2]; 9.81 without
   std::vector<double> force_scales;   ///< |M g| of each body [N]
+  std::vector<double> stiffnesses;    ///< the largest of each body, roughly [N/m]
+  double time_step;                   ///< [s]
   std::unique_ptr<LayerStep> layers;  ///< the contact of the surface with itself; none: it passes through
 
   /// The arguments but `way_out` have to outlive the problem. `memory`: of the plan's sheet, where it meets
   /// itself; else null.
-  StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
-              const WayOut<double>& way_out, LayerMemory* memory = nullptr);
+  StepProblem(const SheetPlan& plan, const Environment& environment, double h, const WayOut<double>& way_out,
+              LayerMemory* memory = nullptr);
   StepProblem(const StepProblem&) = delete;  // the potential refers to the laws
 
   /// Fills in an iterate from its positions.
@@ -45,8 +47,9 @@ struct StepProblem {
 
   /// Whether |r| <= tolerance |M g| for each body, and no vertex misses its weight by more than 30 times as
   /// much. A vertex of small cells counts as no lighter than a tenth of the mean: its weight is far below the
-  /// forces between cells. The rounding of positions turns the friction of a vertex that starts to slide, and
-  /// stretches the springs of holds: that much more may be missing.
+  /// forces between cells. The rounding of positions moves a vertex against its inertia, strains and bends
+  /// what is about it, stretches the springs of holds, and turns the friction of what starts to slide: that
+  /// much more may be missing.
   bool balanced(const Iterate& iterate, double tolerance) const;
 };
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "sim/plan/isometric_bending.h"
+#include "sim/plan/largest_entry.h"
 #include "sim/plan/morley.h"
 
 namespace flash::sim {
@@ -46,13 +47,19 @@ TriangleGroup group_of(const std::vector<RestTriangle>& triangles, int first, in
   return group;
 }
 
-std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, const Body& body,
+std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, const BodyPlan& place,
                                                              data::BendingModel model, double poissons_ratio,
                                                              const data::Weave& weave) {
+  const Body& body = place.body;
+  const auto own_hinges = std::span(plan.hinges).subspan(place.first_hinge, place.hinge_count);
   auto bending = std::make_shared<BendingOperator>();
   bending->model = model;
   bending->kernels = plan.kernels;
-  if (model == data::BendingModel::hinge || body.is_solid()) return bending;
+  if (body.is_solid()) return bending;
+  if (model == data::BendingModel::hinge) {
+    bending->largest_entry = largest_hinge_entry(plan.sheet, body, own_hinges);
+    return bending;
+  }
   const Sheet alone = body_alone(plan.sheet, body);
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(alone);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
@@ -92,7 +99,9 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, Instruction
     return BlockSlot{plan->pattern.size + pair_index(index, plan->pattern, row, column), row < column};
   };
   for (const Body& body : sheet.bodies) {
-    BodyPlan own{.body = body, .first_group = static_cast<int>(plan->triangle_groups.size())};
+    BodyPlan own{.body = body,
+                 .first_group = static_cast<int>(plan->triangle_groups.size()),
+                 .largest_entry = largest_membrane_entry(sheet, body)};
     const int end = body.first_triangle + body.triangle_count;
     for (int first = body.first_triangle; first < end; first += triangle_group_size)
       plan->triangle_groups.push_back(group_of(sheet.triangles, first, end,
@@ -134,8 +143,7 @@ const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingMode
   const auto known =
       std::find_if(made.begin(), made.end(), [&](const auto& entry) { return entry.first == key; });
   if (known != made.end()) return *known->second;
-  made.emplace_back(key,
-                    make_bending_operator(plan, plan.bodies[body].body, model, poissons_ratio, key.weave));
+  made.emplace_back(key, make_bending_operator(plan, plan.bodies[body], model, poissons_ratio, key.weave));
   return *made.back().second;
 }
 

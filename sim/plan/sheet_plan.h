@@ -29,7 +29,7 @@ struct BendingOperator {
   const Kernels* kernels;           ///< as in the plan
   RowGroups stiffness;              ///< from the body's first vertex on; empty for the hinge model
   RowGroups elimination_stiffness;  ///< the same in elimination order of all vertices
-  double largest_entry = 0;         ///< of the stiffness, in magnitude [1/m^2]
+  double largest_entry = 0;         ///< of the stiffness, in magnitude; roughly, of hinges [1/m^2]
   double flat_energy = 0;        ///< of the flat sheet, which has none but by rounding: magnitudes added up
   std::vector<double> stand_in;  ///< one number a block of the pattern: a sparser stiffness to factorize
 };
@@ -53,6 +53,7 @@ struct BodyPlan {
   Body body;  ///< as in the sheet
   int first_group = 0, group_count = 0;
   int first_hinge = 0, hinge_count = 0;
+  double largest_entry = 0;  ///< of its stiffness for E t = 1 [1], of a solid for E = 1 [m], on the diagonal
 };
 
 /// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone, and

@@ -5,6 +5,8 @@
 
 #include "data/asset/asset.h"
 #include "data/files/error.h"
+#include "sim/law/membrane.h"
+#include "sim/law/solid.h"
 
 namespace flash::sim {
 
@@ -36,6 +38,20 @@ std::vector<BodyLaw> body_laws(const SheetPlan& plan, const Environment& environ
       law.yielded[e].rest_angle = environment.state.rest_angles[law.place.first_hinge + e];
   }
   return laws;
+}
+
+double largest_stiffness(const BodyPlan& place, const data::SheetMaterial& material,
+                         const BendingOperator& bending) {
+  const SheetLame lame = sheet_lame(material.largest_stiffness(), material.poissons_ratio);
+  return (lame.lambda + 2 * lame.mu) * place.largest_entry +
+         material.bending_rigidity * bending.largest_entry;
+}
+
+double largest_stiffness(const BodyLaw& law, double h) {
+  const double damped = 1 + law.stiffness_damping() / h;
+  if (law.solid == nullptr) return damped * largest_stiffness(law.place, law.material, law.bending);
+  const SolidLame lame = solid_of(*law.solid).lame;
+  return damped * (lame.lambda + 2 * lame.mu) * law.place.largest_entry;
 }
 
 }  // namespace flash::sim

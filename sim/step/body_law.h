@@ -28,6 +28,14 @@ struct BodyLaw {
   }
 };
 
+/// The largest entry on the diagonal of the stiffness of a sheet at rest, roughly [N/m]: its moduli times the
+/// largest entries of the plan.
+double largest_stiffness(const BodyPlan& place, const data::SheetMaterial& material,
+                         const BendingOperator& bending);
+
+/// The same of any body, with that of its damping over a step of `h` [s].
+double largest_stiffness(const BodyLaw& law, double h);
+
 /// The laws of all bodies, in the order of the plan. Plan and environment have to outlive them. Throws as
 /// bending_operator does, data::InputError where a sheet yields whose bending model does not or
 /// is woven whose membrane law is not, and std::invalid_argument where the solids of both are not the same.

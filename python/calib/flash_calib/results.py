@@ -118,25 +118,41 @@ def load(path: str | os.PathLike, despite_doubts: bool = False) -> Calibration:
     except KeyError as error:
         raise ValueError(f"load: {path}: found no {error.args[0]}, expected what flash-calib handeye writes") from None
     except (ValueError, RuntimeError) as error:
-        raise ValueError(arguments.as_arguments(f"load: {error}")) from None
+        named = str(error) if str(path) in str(error) else f"{path}: {error}"
+        raise ValueError(arguments.as_arguments(f"load: {named}")) from None
 
 
 def calibration_of(found, summary):
     """Of what the extension gives, and of the file."""
-    warnings = [arguments.as_arguments(line) for line in summary["warnings"]]
-    refusals = found.get("refusals", [line.removesuffix(CANNOT_BE_USED) for line in summary["warnings"] if line.endswith(CANNOT_BE_USED)])
-    transform, residuals, sigmas, weakest = (summary[name] for name in ("transform", "residuals", "sigmas", "observability"))
+    def read(name, make, absent=()):
+        """make(the field); a ValueError that names it where it is of another shape."""
+        value = summary[name] if absent == () else summary.get(name, absent)
+        try:
+            return make(value)
+        except (TypeError, ValueError, AttributeError, IndexError):
+            raise ValueError(f"{name}: found {str(value)[:40]}, expected what flash-calib handeye writes") from None
+
+    warnings = read("warnings", lambda lines: [_text(line) for line in lines])
+    refusals = found.get("refusals", [line.removesuffix(CANNOT_BE_USED) for line in warnings if line.endswith(CANNOT_BE_USED)])
+    parent, child = read("transform", lambda t: (_text(t["parent"]), _text(t["child"])))
+    used, reasons = read("views", lambda views: (np.array([view["used"] for view in views], bool), [view["reason"] for view in views]))
     return Calibration(
-        setup=summary["setup"], parent=transform["parent"], child=transform["child"], T=found["T"], covariance=found["covariance"],
-        repeatable=found.get("repeatable"), sd=_deviations(summary["predicted_sd"]), target_pose=found["target_pose"],
-        usable=summary["exit_code"] == 0, refusals=[arguments.as_arguments(line) for line in refusals], warnings=warnings,
-        used=np.array([view["used"] for view in summary["views"]], bool), reasons=[view["reason"] for view in summary["views"]],
-        held_out=HeldOut(residuals["heldout_mm"] / 1e3, math.radians(residuals["heldout_deg"]), residuals["heldout_px"]),
-        noise=Noise(sigmas["robot_rotation_rad"], sigmas["robot_translation_m"], sigmas["corner_px"], sigmas.get("across_sight_m"),
-                    sigmas.get("along_sight_m")),
-        size=_size(summary.get("scale")), focal_length=_size(summary.get("focal_length")),
-        weakest=Weakest(weakest["weakest"], weakest["weakest_mm"] / 1e3, math.radians(weakest["weakest_deg"])),
-        lens=_lens(summary.get("lens")), summary=summary, text=found["text"])
+        setup=summary["setup"], parent=parent, child=child, T=found["T"], covariance=found["covariance"],
+        repeatable=found.get("repeatable"), sd=read("predicted_sd", _deviations), target_pose=found["target_pose"],
+        usable=summary["exit_code"] == 0, refusals=[arguments.as_arguments(line) for line in refusals],
+        warnings=[arguments.as_arguments(line) for line in warnings], used=used, reasons=reasons,
+        held_out=read("residuals", lambda r: HeldOut(r["heldout_mm"] / 1e3, math.radians(r["heldout_deg"]), r["heldout_px"])),
+        noise=read("sigmas", lambda s: Noise(s["robot_rotation_rad"], s["robot_translation_m"], s["corner_px"],
+                                             s.get("across_sight_m"), s.get("along_sight_m"))),
+        size=read("scale", _size, None), focal_length=read("focal_length", _size, None),
+        weakest=read("observability", lambda w: Weakest(w["weakest"], w["weakest_mm"] / 1e3, math.radians(w["weakest_deg"]))),
+        lens=read("lens", _lens, None), summary=summary, text=found["text"])
+
+
+def _text(value):
+    if not isinstance(value, str):
+        raise TypeError
+    return value
 
 
 def _deviations(sd):

@@ -1,0 +1,120 @@
+#include "sim/newton/step_problem.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/sim/sheet_scene.h"
+#include "tests/sim/solid_scene.h"
+
+namespace flash::sim {
+namespace {
+
+using data::Points;
+
+/// The largest entry on the diagonal of the stiffness, by central differences of forces [N/m].
+double measured_stiffness(const SheetPlan& plan, const Environment& environment, double h) {
+  const StepProblem problem(plan, environment, h, {.speed = 1});
+  const double way = 1e-7;
+  double largest = 0;
+  Iterate at;
+  for (Eigen::Index i = 0; i < environment.state.positions.rows(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      double ends[2];
+      for (const int side : {0, 1}) {
+        at.positions = environment.state.positions;
+        at.positions(i, c) += side == 0 ? -way : way;
+        Points carried = at.positions;
+        at.contacts = begin_step(problem.contacts, carried);
+        problem.evaluate(at);
+        ends[side] = at.force(i, c);
+      }
+      largest = std::max(largest, (ends[1] - ends[0]) / (2 * way) - problem.potential.mass()[i] / (h * h));
+    }
+  return largest;
+}
+
+/// That of the plan is no less than what was measured, but for `share`, and no more than `most` times it.
+void expect_near(const SheetPlan& plan, const Environment& environment, double share, double most) {
+  constexpr double h = 0.01;
+  const double measured = measured_stiffness(plan, environment, h),
+               own = largest_stiffness(body_laws(plan, environment).front(), h);
+  EXPECT_GE(own, share * measured);
+  EXPECT_LE(own, most * measured);
+}
+
+// A vertex moved by d is pulled back by no more than (lambda + 2 mu) sum A |grad N|^2 d; the isotropic part,
+// mu of it, is felt along any axis.
+TEST(StepProblem, KnowsTheLargestStiffnessOfASheet) {
+  const auto plan = make_sheet_plan(small_sheet());
+  for (const auto bending :
+       {data::BendingModel::isometric, data::BendingModel::plate, data::BendingModel::hinge}) {
+    SCOPED_TRACE(static_cast<int>(bending));
+    Environment environment = environment_of(plan->sheet);
+    data::SheetMaterial& material = environment.materials[0];
+    material.bending_model = bending;
+    material.membrane_stiffness = 100;
+    material.bending_rigidity = 1e-9;
+    expect_near(*plan, environment, 1, 2.5);
+    material.stiffness_damping = 0.05;
+    expect_near(*plan, environment, 1, 2.5);
+    material.stiffness_damping = 0;
+    material.membrane_stiffness = 1e-6;
+    material.bending_rigidity = 1;
+    expect_near(*plan, environment, 0.9, 4);
+  }
+}
+
+TEST(StepProblem, KnowsTheLargestStiffnessOfASolid) {
+  for (const auto order : {data::ElementOrder::linear, data::ElementOrder::quadratic}) {
+    SCOPED_TRACE(static_cast<int>(order));
+    const auto plan = make_sheet_plan(solid_box({0.1, 0.05, 0.03}, {4, 2, 2}, order));
+    const Environment environment = solid_environment(plan->sheet, {.youngs_modulus = 1e6});
+    expect_near(*plan, environment, 1, 3);
+  }
+}
+
+/// A plate of steel is solved to a tolerance below the rounding of its forces.
+int iterations_of_steel(const Eigen::Vector3d& place, double gravity, StepReport& report) {
+  const auto plan = make_sheet_plan(small_sheet(12));
+  Environment environment = environment_of(plan->sheet);
+  environment.state.positions.rowwise() += place.transpose();
+  environment.gravity = {0, 0, -gravity};
+  constexpr double thickness = 0.02, young = 2.1e11, density = 7800;
+  data::SheetMaterial& material = environment.materials[0];
+  material.bending_model = data::BendingModel::plate;
+  material.membrane_stiffness = young * thickness;
+  material.bending_rigidity = young * std::pow(thickness, 3) / 12 / (1 - 0.09);
+  material.areal_density = density * thickness;
+  environment.holds = {{.vertices = {0, 1, 2, 13, 14, 15}}};
+  Solver solver(plan, {.time_step = 0.005, .max_iterations = 2000, .tolerance = 1e-8});
+  report = solver.step(environment);
+  return report.iterations;
+}
+
+TEST(StepProblem, AStepEndsWhereRoundingIsAllThatIsLeft) {
+  for (const double gravity : {0.0, 9.81})
+    for (const Eigen::Vector3d& place : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(30, -20, 10)}) {
+      StepReport report;
+      EXPECT_LE(iterations_of_steel(place, gravity, report), 20);
+      EXPECT_TRUE(report.converged);
+      EXPECT_GT(report.residual, 1e-8);  // which no step can reach
+      EXPECT_EQ(report.substeps, 1);
+    }
+}
+
+// A cloth's rounding is far below all that is asked of it: nothing changes there.
+TEST(StepProblem, ACapOnRoundingIsFarBelowATolerance) {
+  const auto plan = make_sheet_plan(small_sheet());
+  Environment environment = environment_of(plan->sheet);
+  environment.state.positions.rowwise() += Eigen::RowVector3d(1, 1, 1);
+  environment.materials[0].membrane_stiffness = 1000;
+  environment.materials[0].bending_rigidity = 1e-3;
+  const StepProblem problem(*plan, environment, 0.01, {.speed = 1});
+  const double least_weight = problem.potential.mass().minCoeff() * 9.81;
+  EXPECT_LT(std::numeric_limits<double>::epsilon() * 2 * problem.stiffnesses[0], 1e-7 * least_weight);
+}
+
+}  // namespace
+}  // namespace flash::sim
