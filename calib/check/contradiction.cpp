@@ -145,11 +145,12 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
                by_size = resized ? ratio_at({poses.X, resized->Z}, resized->observations, resized->scale)
                                  : INFINITY,
                by_lens = refocused ? ratio_at({poses.X, refocused->Z}, refocused->observations) : INFINITY;
+  constexpr double as_well = 1.5;  // a camera that moved along its axis looks like it, by six numbers for one
   std::string cause;
   if (by_target <= kContradicts && by_target <= by_camera)
     cause = "the target is not where it was at the calibration, " + moved_by(poses.Z, target_moved.Z) +
             ": these views cannot check the calibration; --refit-target takes its place from them";
-  else if (by_lens <= kContradicts && by_lens <= by_size && by_lens <= by_camera)
+  else if (by_lens <= kContradicts && by_lens <= by_size && by_lens <= as_well * by_camera)
     cause =
         "the camera's focal length is " + data::format_short(refocused->scale * extrinsics.focal_length) +
         " times that with which these poses were made, and was " +

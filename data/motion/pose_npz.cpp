@@ -87,9 +87,10 @@ std::vector<std::vector<double>> rotations_in(const NumpyArray& array, const cha
   for (std::vector<double>& row : rows) {
     const Eigen::Vector3d vector(row[0], row[1], row[2]);
     const double angle = vector.stableNorm();
-    if (!(angle <= longest))
-      throw input_error(path, "R_" + std::string(name + 1),
-                        "found a rotation vector of length " + format_short(angle) + ", expected radians");
+    if (!vector.allFinite() || angle > longest)
+      throw input_error(
+          path, "R_" + std::string(name + 1),
+          "found a rotation vector of length " + format_short(vector.norm()) + ", expected radians");
     const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R =
         angle > 0 ? Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix() : Eigen::Matrix3d::Identity();
     row.assign(R.data(), R.data() + 9);

@@ -7,23 +7,13 @@
 #include <limits>
 
 #include "calib/calibrate/calibrate_pairs.h"
-#include "calib/geometry/pose_from_pixels.h"
-#include "tests/calib/knocked_scene.h"
+#include "tests/calib/pairs_of_scene.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
 namespace {
 
 using Mount = calib::Setup;  // testing::Test has a private member of the name Setup
-
-std::vector<Observation> pairs_of(const HandEyeScene& scene) {
-  std::vector<Observation> pairs = scene.observations;
-  for (Observation& pair : pairs) {
-    pair.points.clear();
-    pair.pixels.resize(2, 0);
-  }
-  return pairs;
-}
 
 // Nothing closes, so nothing closes to 0.0 deg either.
 TEST(Pairs, FourRandomOnesAreToldToTurnByOtherAngles) {
@@ -145,151 +135,6 @@ TEST(Pairs, ThatMayBeInvertedInThreeWaysAreToldAllOfThem) {
       << said;
 }
 
-/// Robot and camera as they stand, with noise of each.
-HandEyeScene noisy_scene(Mount setup, double robot_mm, double camera_mm, unsigned seed) {
-  SceneSettings settings = protocol_settings(setup);
-  settings.views = 24;
-  settings.robot_mm = robot_mm;
-  settings.robot_deg = 0.02;
-  HandEyeScene scene = make_scene(settings, board_points(), seed);
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
-  for (Observation& pair : scene.observations)
-    for (double& value : pair.T_camera_target.front().translation())
-      value += 1e-3 * camera_mm * normal(random);
-  return scene;
-}
-
-bool within_999(const Calibration& result, const HandEyeScene& scene) {
-  const Vector6d error = motion_between(result.poses.X, scene.truth.X);
-  return error.dot(result.covariance.ldlt().solve(error)) < 22.5;  // 99.9 % of chi-square, 6
-}
-
-bool tells_of_size(const Calibration& result) {
-  return std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
-    return warning.find("times as large as stated") != std::string::npos;
-  });
-}
-
-TEST(Pairs, OfATargetOfAnotherSizeAreToldItAndSolvedForIt) {
-  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
-    for (const double size : {1.2, 0.9, 1.05}) {
-      const HandEyeScene scene = noisy_scene(setup, 0.5, 0.5, 21);
-      std::vector<Observation> pairs = pairs_of(scene);
-      for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
-      const Calibration stated = calibrate_pairs(setup, pairs);
-      EXPECT_TRUE(!stated.usable || within_999(stated, scene)) << size;
-      EXPECT_EQ(stated.warnings.front().substr(0, 14), "the target is ") << stated.warnings.front();
-      ASSERT_TRUE(stated.size && stated.size->wanted);
-      EXPECT_LT(std::abs(stated.size->wanted->estimate - size), 4 * stated.size->wanted->sd) << size;
-      CalibrateSettings kept;
-      kept.size_as_stated = true;
-      EXPECT_TRUE(calibrate_pairs(setup, pairs, kept).usable) << size;
-      CalibrateSettings unknown;
-      unknown.target_size_sd = std::numeric_limits<double>::infinity();
-      const Calibration solved = calibrate_pairs(setup, pairs, unknown);
-      EXPECT_TRUE(solved.usable) << size;
-      EXPECT_FALSE(tells_of_size(solved)) << size;
-      EXPECT_TRUE(within_999(solved, scene)) << size;
-    }
-}
-
-// Where the size is solved for, what was stated is no reason to refuse, unless it is that of another unit.
-TEST(Pairs, OfATargetOfAnySizeAreSolvedForIt) {
-  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
-    for (const double size : {0.1, 0.45, 3.0, 1000.0}) {
-      const HandEyeScene scene = noisy_scene(setup, 0.5, 0.5, 21);
-      std::vector<Observation> pairs = pairs_of(scene);
-      for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
-      const std::string said = data::input_error_of([&] { calibrate_pairs(setup, pairs); });
-      EXPECT_EQ(said.substr(0, 4), size > 20 ? "tran" : "the ") << size << said;
-      CalibrateSettings unknown;
-      unknown.target_size_sd = std::numeric_limits<double>::infinity();
-      if (size > 20) {
-        EXPECT_EQ(data::input_error_of([&] { calibrate_pairs(setup, pairs, unknown); }), said);
-        continue;
-      }
-      const Calibration solved = calibrate_pairs(setup, pairs, unknown);
-      EXPECT_TRUE(solved.usable) << size;
-      EXPECT_EQ(solved.used.size(), pairs.size()) << size;
-      EXPECT_LT(std::abs(solved.size->estimate - size), 4 * solved.size->sd) << size;
-      EXPECT_TRUE(within_999(solved, scene)) << size;
-      // Poses stay as they were given.
-      EXPECT_NEAR((solved.selection.observations[3].T_camera_target.front().translation() -
-                   pairs[3].T_camera_target.front().translation())
-                          .norm() /
-                      pairs[3].T_camera_target.front().translation().norm(),
-                  0, 1e-12);
-    }
-}
-
-// So few do not tell their noise and a size together.
-TEST(Pairs, OfWhichThereAreFewAreToldOfASizeThatClosesThem) {
-  const HandEyeScene scene = noisy_scene(Mount::eye_in_hand, 0.1, 0.1, 21);
-  std::vector<Observation> pairs = pairs_of(scene);
-  pairs.resize(6);
-  EXPECT_FALSE(tells_of_size(calibrate_pairs(Mount::eye_in_hand, pairs)));
-  for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= 0.8;
-  const Calibration result = calibrate_pairs(Mount::eye_in_hand, pairs);
-  EXPECT_TRUE(tells_of_size(result));
-  EXPECT_FALSE(result.usable);
-}
-
-// Prints are off by a percent or two.
-TEST(Pairs, OfATargetOfNearlyTheSizeStatedAreAnsweredForTheSizeThatTheyTell) {
-  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
-    for (const double size : {0.98, 0.99, 1.0, 1.01, 1.02})
-      for (const unsigned seed : {21U, 22U, 23U}) {
-        const HandEyeScene scene = noisy_scene(setup, 0.5, 0.5, seed);
-        std::vector<Observation> pairs = pairs_of(scene);
-        for (Observation& pair : pairs) pair.T_camera_target.front().translation() /= size;
-        const Calibration result = calibrate_pairs(setup, pairs);
-        EXPECT_TRUE(result.usable && within_999(result, scene)) << size << ' ' << seed;
-        EXPECT_LT(std::abs(result.size->estimate - size), 4 * result.size->sd) << size << ' ' << seed;
-      }
-}
-
-/// With poses of the target that a camera made whose focal length was stated so many times too long.
-std::vector<Observation> pairs_of_lens(const HandEyeScene& scene, double too_long) {
-  std::vector<Observation> pairs = pairs_of(scene);
-  data::CameraIntrinsics camera = scene.camera;
-  camera.fx *= too_long;
-  camera.fy *= too_long;
-  // About the middle a wrong focal length leaves how deep the target is.
-  const Eigen::Translation3d middle(scene.points.rowwise().mean());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const Observation& view = scene.observations[i];
-    pairs[i].T_camera_target = {fitted_pose(camera, scene.points(Eigen::all, view.points), view.pixels,
-                                            view.T_camera_target.front()) *
-                                middle};
-  }
-  return pairs;
-}
-
-bool tells_of_lens(const Calibration& result) {
-  return std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
-    return warning.starts_with("the camera's focal length is ");
-  });
-}
-
-TEST(Pairs, OfALensThatIsOffAreAnsweredForTheFocalLengthThatTheyTell) {
-  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
-    for (const double too_long : {0.97, 0.99, 1.0, 1.01, 1.03})
-      for (const unsigned seed : {21U, 22U, 23U}) {
-        const HandEyeScene scene = noisy_scene(setup, 0.1, 0, seed);
-        const std::vector<Observation> pairs = pairs_of_lens(scene, too_long);
-        const Calibration result = calibrate_pairs(setup, pairs);
-        EXPECT_TRUE(result.usable && within_999(result, scene)) << too_long << ' ' << seed;
-        ASSERT_TRUE(result.focal_length && result.focal_length->wanted);
-        EXPECT_LT(std::abs(result.focal_length->estimate - 1 / too_long), 4 * result.focal_length->sd)
-            << too_long << ' ' << seed;
-        EXPECT_EQ(tells_of_lens(result), std::abs(too_long - 1) > 0.015) << too_long << ' ' << seed;
-        CalibrateSettings kept;
-        kept.lens = LensKnowledge::stated;
-        EXPECT_FALSE(calibrate_pairs(setup, pairs, kept).focal_length);
-      }
-}
-
 // Noise of one side alone looks like a size: which of them it is, pairs do not tell.
 TEST(Pairs, WhoseNoiseIsTheCamerasAreAnsweredAndNotCalledTheRobots) {
   for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
@@ -356,6 +201,23 @@ TEST(Pairs, BetweenWhichTheCameraMovedAreNoAnswer) {
     }
 }
 
+// Copies of a pair tell nothing anew, and outliers move means alone.
+TEST(Pairs, ThatAreCopiesOrOutliersClaimNoMotion) {
+  bool usable = false;
+  for (unsigned seed = 201; seed < 211; ++seed) {
+    const Mount setup = seed % 2 ? Mount::eye_in_hand : Mount::eye_to_hand;
+    const std::vector<Observation> pairs = pairs_of(noisy_scene(setup, 0.3, 1.0, seed));
+    std::vector<Observation> copies, spoilt = pairs;
+    for (const Observation& pair : pairs) copies.insert(copies.end(), 3, pair);
+    EXPECT_EQ(told_of_motion(copies, setup, false, copies.size(), 0, usable), "") << seed;
+    std::mt19937 random(seed);
+    for (int k = 0; k < 5; ++k)
+      spoilt[random() % spoilt.size()].T_camera_target.front().translation() +=
+          Eigen::Vector3d(0.3, -0.2, 0.1) * (1 + k);
+    EXPECT_EQ(told_of_motion(spoilt, setup, false, spoilt.size(), 0, usable), "") << seed;
+  }
+}
+
 TEST(Pairs, InWhichNothingMovedClaimNoMotion) {
   int claimed = 0;
   bool usable = false;
@@ -379,25 +241,6 @@ TEST(Pairs, ThatAreExchangedAreDoubtedByTheirDistances) {
   EXPECT_FALSE(doubted());
   for (Observation& pair : pairs) std::swap(pair.T_base_gripper, pair.T_camera_target.front());
   EXPECT_TRUE(doubted());
-}
-
-TEST(Pairs, OfARobotThatOnlyTurnsDoNotTellTheSize) {
-  HandEyeScene scene = noisy_scene(Mount::eye_in_hand, 0.5, 0.5, 21);
-  const Eigen::Vector3d place = scene.true_poses.front().translation();
-  std::mt19937 random(5);
-  std::normal_distribution<double> normal(0, 5e-4);
-  for (std::size_t i = 0; i < scene.observations.size(); ++i) {
-    Eigen::Isometry3d pose = scene.true_poses[i];
-    pose.translation() = place;
-    scene.observations[i].T_base_gripper = pose;
-    scene.observations[i].T_camera_target = {scene.truth.X.inverse() * pose.inverse() * scene.truth.Z};
-    for (double& value : scene.observations[i].T_camera_target.front().translation()) value += normal(random);
-  }
-  CalibrateSettings unknown;
-  unknown.target_size_sd = std::numeric_limits<double>::infinity();
-  const std::string said =
-      data::input_error_of([&] { calibrate_pairs(Mount::eye_in_hand, pairs_of(scene), unknown); });
-  EXPECT_EQ(said.substr(0, 48), "the data do not tell the size of the target: the") << said;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "calib/calibrate/calibrate.h"
 #include "calib/geometry/pose.h"
 #include "tests/calib/hand_eye_scene.h"
+#include "tests/calib/pairs_of_scene.h"
 
 namespace flash::calib {
 namespace {
@@ -105,6 +106,27 @@ TEST_P(Contradicts, ATargetOfAnotherSizeIsToldWhereverItIs) {
         ASSERT_NE(at, std::string::npos) << found.sentence;
         EXPECT_NEAR(std::stod(found.sentence.substr(at + begin.size())), size, 0.01) << found.sentence;
       }
+}
+
+// Pairs of poses, made anew with another focal length than those of the calibration.
+TEST_P(Contradicts, PosesOfAnotherLensAreToldWhereverTheTargetIs) {
+  for (const double lens : {0.97, 1.05})
+    for (const bool refit_target : {false, true}) {
+      const HandEyeScene scene = noisy_scene(GetParam(), 0.3, 0, 5);
+      const Calibration calibration = calibrate_pairs(GetParam(), pairs_of_lens(scene, 1));
+      Extrinsics extrinsics = extrinsics_of(calibration, {});
+      extrinsics.held_out = {calibration.held_out.deg * M_PI / 180, 1e-3 * calibration.held_out.mm};
+      const std::vector<Observation> views =
+          with_scales(pairs_of_lens(scene, lens), {extrinsics.target.scale, extrinsics.focal_length});
+      HandEyePoses poses = calibration.poses;
+      if (refit_target) poses.Z = target_pose_from(GetParam(), poses.X, views);
+      const ProjectionCheck check = check_projection(GetParam(), poses, {}, {}, views, extrinsics.target, {});
+      const Contradiction found = contradiction(extrinsics, poses, refit_target, {}, {}, views, check);
+      const std::string begin = "the camera's focal length is ";
+      const std::size_t at = found.sentence.find(begin);
+      ASSERT_NE(at, std::string::npos) << found.sentence;
+      EXPECT_NEAR(std::stod(found.sentence.substr(at + begin.size())), 1 / lens, 0.01) << found.sentence;
+    }
 }
 
 TEST_P(Contradicts, WhatNeitherExplainsIsSaid) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "data/files/error.h"
 #include "tests/data/npz_text.h"
 #include "tests/data/temporary_folder.h"
@@ -128,6 +130,24 @@ TEST(PairsOfNumpy, ThatAreNoneAreToldWhatWasFoundAndExpected) {
                   {"target", {2, 4, 4}, kMatrices}})
                 .find("found another array of this name but for capitals and signs"),
             std::string::npos);
+  for (const double wrong : {std::nan(""), HUGE_VAL})
+    for (const std::size_t entry : {16, 19}) {  // of a rotation and of a place
+      std::vector<double> spoilt = kMatrices;
+      spoilt[entry] = wrong;
+      const std::string text = said({{"robot", {2, 4, 4}, kMatrices}, {"target", {2, 4, 4}, spoilt}});
+      EXPECT_NE(text.find("pair 1: found "), std::string::npos) << text;
+    }
+  for (const double wrong : {std::nan(""), 1e300})
+    EXPECT_NE(said({{"R_gripper2base", {1, 3}, {0, wrong, 0}},
+                    {"t_gripper2base", {1, 3}, {0, 0, 0}},
+                    {"R_target2cam", {1, 3}, {0, 0, 0}},
+                    {"t_target2cam", {1, 3}, {0, 0, 1}}})
+                  .find("R_gripper2base: found a rotation vector of length "),
+              std::string::npos);
+  EXPECT_NE(
+      said({{"robot", {1, 7}, {0, 0, 0, 0, std::nan(""), 0, 1}}, {"target", {1, 7}, {0, 0, 1, 0, 0, 0, 1}}})
+          .find("pair 0: quaternion has length "),
+      std::string::npos);
   std::vector<double> skewed = kMatrices;
   skewed[16] = 0.9;
   EXPECT_NE(said({{"robot", {2, 4, 4}, skewed}, {"target", {2, 4, 4}, kMatrices}}).find("pair 1"),
