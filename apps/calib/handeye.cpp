@@ -202,7 +202,7 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics, con
   } else if (c.size && c.size->sd > 0) {
     std::printf("target: %.4f +- %.4f times as large as stated\n", c.size->estimate, c.size->sd);
   }
-  if (c.focal_length)
+  if (c.focal_length && c.focal_length->sd > 0)
     std::printf("focal length: %.4f +- %.4f times that with which the target's poses were made%s\n",
                 c.focal_length->estimate, c.focal_length->sd,
                 options.lens.knowledge == calib::LensKnowledge::near ? " (--lens stated takes that)" : "");
