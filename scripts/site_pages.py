@@ -1,7 +1,10 @@
-"""Pages of the site that stand in no file of docs/: options of the programs, classes of the package, sources that a page links to.
+"""Pages of the site that stand in no file of docs/: options of the programs, classes of the package, notebooks with what they print
+and draw, sources that a page links to.
 
 MkDocs calls the functions named on_*. scripts/site gives the folder of the programs, FLASH_BIN.
 """
+import base64
+import json
 import os
 import pathlib
 import posixpath
@@ -66,6 +69,33 @@ def cpp_page():
             "Doxygen's.\n\n" + "\n".join(rows) + "\n")
 
 
+def notebook_page(path):
+    """The page of a notebook, as tests/python/test_notebooks.py has run it, and its pictures by name."""
+    done = ROOT / "build" / "notebooks" / path.name
+    shown = json.loads(done.read_text(encoding="utf-8")) if done.is_file() else {"cells": []}
+    if ["".join(cell["source"]) for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]] != [
+            "".join(cell["source"]) for cell in shown["cells"]]:
+        raise PluginError(f"{path.name}: found another one, or none, in build/notebooks; scripts/site runs those that have changed")
+    parts, pictures = [], {}
+    for cell in shown["cells"]:
+        source = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            parts.append(source)
+            continue
+        parts.append(f"````python\n{source}\n````")
+        text = ""
+        for output in cell["outputs"]:
+            text += "".join(output.get("text", []))
+            if "image/png" in output.get("data", {}):
+                name = f"{path.stem}_{len(pictures)}.png"
+                pictures[name] = base64.b64decode("".join(output["data"]["image/png"]))
+                parts.append(f"![A picture that the cell draws]({name})")
+        if text:
+            parts.append(f"````text\n{text.rstrip()}\n````")
+    parts.insert(1, f'<a href="{path.name}" download>The notebook</a> without what it prints and draws.')
+    return "\n\n".join(parts) + "\n", pictures
+
+
 def outside(page, target):
     """The path of a link from the root of the checkout, where it leaves docs/; else None."""
     path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), target))
@@ -84,6 +114,11 @@ def on_files(files, config):
         add(f"reference/{name}.md", program_page(name))
     add("reference/python.md", python_page())
     add("reference/cpp.md", cpp_page())
+    for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")):
+        text, pictures = notebook_page(path)
+        add(f"notebooks/{path.stem}.md", text)
+        for name, picture in pictures.items():
+            add(f"notebooks/{name}", picture)
     linked = set()
     for file in files.documentation_pages():
         linked |= {outside(file.src_uri, match[2]) for match in LINK.finditer(file.content_string)}
@@ -99,7 +134,7 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Links that leave docs/ lead to the pages made here. Those of files at the root are as seen from there."""
+    """Links that leave docs/, or to a notebook, lead to the pages made here. Those of files at the root are as seen from there."""
     here = page.file.src_uri
     at_root = here in PAGES.values()
 
@@ -107,9 +142,10 @@ def on_page_markdown(markdown, page, config, files):
         text, target, anchor = match[1], match[2], match[3] or ""
         if re.match(r"[a-z]+:", target):
             return match[0]
+        target = re.sub(r"\.ipynb$", ".md", target)
         path = posixpath.normpath(target) if at_root else outside(here, target)
         if path is None or (ROOT / path).is_dir():
-            return match[0] if path is None else text  # a folder is no page
+            return f"[{text}]({target}{anchor})" if path is None else text  # a folder is no page
         to = path[len("docs/"):] if path.startswith("docs/") else PAGES.get(path, source_page(path))
         return f"[{text}]({posixpath.relpath(to, posixpath.dirname(here) or '.')}{anchor})"
 
