@@ -34,7 +34,9 @@ struct ProcessorIterate {
   }
   data::Points product(const BlockValues<double>& values, const data::Points& x) const {
     data::Points y = data::Points::Zero(x.rows(), 3);
-    const auto block = [&](std::size_t k) { return Eigen::Map<const Eigen::Matrix3d>(values.data() + 9 * k); };
+    const auto block = [&](std::size_t k) {
+      return Eigen::Map<const Eigen::Matrix3d>(values.data() + 9 * k);
+    };
     for (Eigen::Index i = 0; i < x.rows(); ++i)
       y.row(i) += x.row(i) * block(static_cast<std::size_t>(i)).transpose();
     for (std::size_t k = 0; k < plan->pattern.pairs.size(); ++k) {
