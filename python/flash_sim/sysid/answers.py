@@ -14,7 +14,7 @@ class Answer:
     """A finished search. Dicts are by name of a parameter, in the units of `units`."""
     path: str  # of summary.json
     values: dict[str, float]  # every parameter of the estimate, those that were held included
-    estimates: dict[str, float]  # of what was searched; without those that have none
+    estimates: dict[str, float]  # of what was searched, also where the verdict is "no"; without those that have none
     intervals: dict[str, tuple[float, float]]  # 95 %, of what was searched and is not "no"; of a bound one end is the range's
     verdicts: dict[str, str]  # of what was searched: "yes", "no", "lower_bound" or "upper_bound"
     notes: dict[str, str]  # why, in a line
