@@ -89,6 +89,7 @@ def one_of(what, value, known):
 
 def as_arguments(line):
     """A line of the program in which options are arguments of functions: "--target-size solved" becomes "target_size solved"."""
+    line = line.replace("(--camera-info writes it)", "(Calibration.lens)")
     return re.sub(r"--(target-size-sd|target-size|camera-height|target-height|lens|setup|despite-doubts)(?![a-z-])",
                   lambda option: option[1].replace("-", "_"), line)
 
