@@ -324,4 +324,10 @@ def test_files_that_are_none_are_refused(tmp_path):
     for missing in ("transform", "views", "residuals", "covariance", "warnings", "predicted_sd"):
         (tmp_path / "camera.json").write_text(json.dumps({k: v for k, v in answer.summary.items() if k != missing}))
         refused(flash_calib.load, tmp_path / "camera.json", match=missing)
+    for name in ("transform", "views", "residuals", "predicted_sd", "sigmas", "observability", "warnings", "scale"):
+        for wrong in (7, "seven", [7], {"seven": 7}, None):
+            if (name, wrong) != ("scale", None):
+                (tmp_path / "camera.json").write_text(json.dumps({**answer.summary, name: wrong}))
+                with pytest.raises(ValueError, match="load: .*camera.json: "):
+                    flash_calib.load(tmp_path / "camera.json")
     assert len(board()) == 30
