@@ -75,8 +75,10 @@ std::string content_of(const NumpyArray& array) {
   }
   if (count_of(array.shape) == 0) return "no element";
   if (array.type[0] == '>') return "numbers with their bytes the other way round" + quoted;
-  return (array.values.empty() ? "numbers of a type that is not read"
-                               : "another number of elements than its shape says") +
+  constexpr std::string_view kRead = "<f8 <f4 <i8 <i4 <u4 <u2 <i2 |u1 |i1";
+  return (array.type.size() != 3 || kRead.find(array.type) == kRead.npos
+              ? "numbers of a type that is not read"
+              : "another number of elements than its shape says") +
          quoted;
 }
 

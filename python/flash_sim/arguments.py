@@ -25,6 +25,8 @@ def numbers(what, value, *shapes):
 
 def _array(what, value):
     """Of numpy; of what is on a CUDA device a copy."""
+    if np.ma.is_masked(value):
+        raise TypeError(f"{what}: found an array with a mask, expected one without: leave out what it hides")
     try:
         return np.asarray(on_host(value))
     except Exception as error:  # a tensor on another device, nested lists of different lengths

@@ -309,6 +309,15 @@ def test_other_arguments_are_refused_by_name():
     call(any_end=1, match="any_end: found")
 
 
+def test_masks_and_halves_of_corners_are_refused():
+    robot, target, _, _ = cell("eye-in-hand", 9)
+    hidden = np.ma.masked_array(robot, np.arange(9)[:, None, None] == 3 + np.zeros((9, 4, 4)))
+    refused(flash_calib.handeye_pairs, "eye-in-hand", hidden, target, match="T_base_gripper: found an array with a mask")
+    corners = [np.full((len(board()), 2), 100.0) for _ in robot]
+    corners[2][5, 1] = np.nan
+    refused(flash_calib.handeye_corners, "eye-in-hand", robot, corners, board(), CAMERA, match="view 2: found nan in one column of corner 5")
+
+
 def test_files_that_are_none_are_refused(tmp_path):
     for text in ("", "{}", "[1]", "{", '{"schema": "flash-extrinsics/2"}'):
         (tmp_path / "camera.json").write_text(text)

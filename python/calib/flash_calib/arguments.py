@@ -95,6 +95,8 @@ def as_arguments(line):
 
 
 def _array(what, value):
+    if np.ma.is_masked(value):
+        raise TypeError(f"{what}: found an array with a mask, expected one without: leave out what it hides")
     try:
         return np.asarray(value)
     except Exception as error:  # nested lists of different lengths, a tensor on a device

@@ -159,6 +159,9 @@ def _pixels(what, corners, views, points):
         if seen is None:
             continue
         pixels[i] = arguments.numbers(f"{what}: view {i}", seen, (points, 2), unseen=True)
+        half = np.isnan(pixels[i]).any(axis=1) & ~np.isnan(pixels[i]).all(axis=1)
+        if half.any():
+            raise ValueError(f"{what}: view {i}: found nan in one column of corner {np.argmax(half)}, expected both or neither")
         far = np.abs(pixels[i]) > LARGEST_PIXEL
         if far.any():
             raise ValueError(f"{what}: view {i}: found {pixels[i][far][0]:.6g} px, expected at most {LARGEST_PIXEL:.0f}")
