@@ -124,8 +124,13 @@ Vector6d camera_with(const Calibration& result, const std::vector<PoseLoop>& loo
                         fit_pose_space(rescaled(loops, over), result.poses, {}, along).poses.X);
 }
 
-bool excluded(const Calibration& result, const Vector6d& away) {
-  return away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_95_of_6;
+/// Whether an answer that far away lies outside of what is stated. What was stated as exact is only
+/// contradicted by what cannot be chance: an arm whose links are off looks like another size, and its errors
+/// are in the covariance.
+bool excluded(const Calibration& result, const Vector6d& away, bool stated_as_exact = false) {
+  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
+  return away.dot(result.covariance.ldlt().solve(away)) >
+         (stated_as_exact ? kChiSquare999 : data::chi_square_95_of_6);
 }
 
 void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,
@@ -134,33 +139,34 @@ void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,
   if (!size.far_off()) return;
   const Vector6d away = camera_with(result, loops, along, {.size = size.wanted->estimate / size.estimate}),
                  as_stated = camera_with(result, loops, along, {.size = 1 / size.estimate});
-  const bool depends = excluded(result, away) || excluded(result, as_stated);
+  const bool exact = size.prior_sd == 0,
+             depends = excluded(result, away, exact) || excluded(result, as_stated, exact);
   if (settings.size_as_stated) result.covariance += away * away.transpose();
   const Vector6d& farther = as_stated.head<3>().norm() > away.head<3>().norm() ? as_stated : away;
+  constexpr double kOfLinks = 0.03;  // what an arm's links may make of a length
   char text[400];
   std::snprintf(
       text, sizeof text,
-      "the target is %.4g times as large as stated (+- %.2g, 2 sd), or the robot's translations are not "
-      "in metres: measure a square; the answer is for %.4g, and with the stated or the other size the camera "
-      "is up to "
-      "%.1f mm and %.2f deg from where it is here (--target-size solved takes the estimate)",
-      size.wanted->estimate, 2 * size.wanted->sd, size.estimate, 1e3 * farther.head<3>().norm(),
-      farther.tail<3>().norm() * 180 / M_PI);
+      "the target is %.4g times as large as stated (+- %.2g, 2 sd), or the robot's %s: measure a square; the "
+      "answer is for %.4g, and with the stated or the other size the camera is up to %.1f mm and %.2f deg "
+      "from "
+      "where it is here (--target-size solved takes the estimate)",
+      size.wanted->estimate, 2 * size.wanted->sd,
+      std::abs(size.wanted->estimate - 1) < kOfLinks ? "lengths are off by as much"
+                                                     : "translations are not in metres",
+      size.estimate, 1e3 * farther.head<3>().norm(), farther.tail<3>().norm() * 180 / M_PI);
   tell_first(result, text, depends && !settings.size_as_stated);
 }
 
 /// One that was kept as it is stated, where the pairs want another.
 void tell_kept_focal_length(Calibration& result, const Vector6d& away, const CalibrateSettings& settings) {
-  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom, as of the lens of pictures
   const TargetSize::Wanted& wanted = *result.focal_length->wanted;
-  const bool shared = keeps_shared_lens(settings),
-             depends = away.dot(result.covariance.ldlt().solve(away)) > kChiSquare999;
+  const bool shared = keeps_shared_lens(settings), depends = excluded(result, away, true);
   char text[400];
   std::snprintf(text, sizeof text,
                 "the camera's focal length is %.4g times (+- %.2g, 2 sd) that with which the target's poses "
-                "were made; the "
-                "stated one was kept%s, and with the other the camera is %.1f mm and %.2f deg from where it "
-                "is here: %s",
+                "were made; the stated one was kept%s, and with the other the camera is %.1f mm and %.2f deg "
+                "from where it is here: %s",
                 wanted.estimate, 2 * wanted.sd, shared ? ", as arms on one camera share it" : "",
                 1e3 * away.head<3>().norm(), away.tail<3>().norm() * 180 / M_PI,
                 shared ? "calibrate the lens and make the poses anew" : "leave --lens stated out");
