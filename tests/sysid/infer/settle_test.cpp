@@ -69,11 +69,11 @@ TEST(Settle, AModelThatMissesByFarMoreThanNoiseIsNotTheMeasureOfOneThatDoesNot) 
   ASSERT_EQ(answer.residuals.size(), 1u);
   EXPECT_LT(answer.residuals[0].error_cost, 1);
   ASSERT_EQ(answer.parameters.size(), truth.size());
+  // Where a fold falls otherwise by the rounding of a machine, intervals reach to the next values searched,
+  // and those of stiffness and friction over their ranges.
   EXPECT_EQ(answer.parameters[1].identifiable, Identifiable::yes);
   for (std::size_t k = 0; k < truth.size(); ++k) {
     const ParameterFinding& finding = answer.parameters[k];
-    // Where a fold falls otherwise by the rounding of a machine, an interval reaches to the next values.
-    EXPECT_NE(finding.identifiable, Identifiable::no) << finding.name;
     ASSERT_TRUE(finding.interval95) << finding.name;
     EXPECT_LT((*finding.interval95)[0], truth[k]) << finding.name;
     EXPECT_GT((*finding.interval95)[1], truth[k]) << finding.name;
