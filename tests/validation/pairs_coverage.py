@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """How often flash-calib's 95 % region of pairs of poses holds the truth: arms of three makes whose zeros, links, axes and gears are off, seen by a
 camera that scatters. Arms, poses and pairs are drawn by this file and arm_errors.py alone. Prints a table: pairs far apart and near each
-other, few, in clusters, of an arm that has noise alone, and with poses of the target that a lens of another focal length made. Base and gripper are those that the robot
+other, few, in clusters, of an arm that has noise alone, and with poses of the target that a lens of another focal length made, or of a target of
+another size. Base and gripper are those that the robot
 reports: what its first and its last joint are off by at every pose alike is part of them, as it is where the robot works."""
 import argparse
 import json
@@ -27,6 +28,9 @@ KINDS = {"14 pairs": (14, 0.6, 0, True), "30 pairs": (30, 0.6, 0, True), "4 pair
 LENSES = {"lens 0.5 % (sd)": ("14 pairs", lambda random: 0.005 * random.standard_normal()), "lens 1 %": ("14 pairs", lambda random: 0.01 * random.choice((-1, 1))),
           "lens 2 %": ("14 pairs", lambda random: 0.02 * random.choice((-1, 1))), "lens 2 %, 30 pairs": ("30 pairs", lambda random: 0.02 * random.choice((-1, 1))),
           "lens 2 %, noise alone": ("noise alone", lambda random: 0.02 * random.choice((-1, 1)))}
+# Likewise, and how many times as large as stated the target is, or its inverse.
+SIZES = {"4 pairs, size 10 %": ("4 pairs", 1.1), "6 pairs, size 10 %": ("6 pairs", 1.1), "14 pairs, size 10 %": ("14 pairs", 1.1),
+         "14 pairs, size 3 %": ("14 pairs", 1.03)}
 
 
 def pose(R, t):
@@ -69,6 +73,7 @@ def constant_errors(joints, tool, zeros, origins, axes):
 
 def drawn(random, setup, kind):
     """Poses of the gripper and of the target, as they are reported, X, and X from the base or to the gripper that the robot reports."""
+    kind, size = SIZES.get(kind, (kind, None))
     kind, off = LENSES.get(kind, (kind, None))
     off = None if off is None else off(random)
     count, spread, clusters, wrong = KINDS[kind]
@@ -104,6 +109,10 @@ def drawn(random, setup, kind):
             target.append(pose(seen[:3, :3] @ turned(CAMERA[0] * random.standard_normal(3)), place + CAMERA[1] * (noise - along) + CAMERA[2] * along))
         else:
             target.append(pose_from_corners(random, seen, off))
+    if size is not None:
+        size **= random.choice((-1, 1))
+        for T in target:
+            T[:3, 3] /= size
     L, R = constant_errors(joints, tool, zeros, origins, axes)
     return numpy.array(robot), numpy.array(target), X, R @ X if in_hand else numpy.linalg.inv(L) @ X
 
@@ -120,7 +129,7 @@ def answer(calib, folder, setup, robot, target):
     R = numpy.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-    told = any("focal length" in warning for warning in result["warnings"])
+    told = any("focal length is" in warning or "times as large as stated" in warning for warning in result["warnings"])
     return pose(R, result["transform"]["translation"]), numpy.array(result["covariance"]), done.returncode, told
 
 
@@ -136,12 +145,12 @@ def main():
     parser.add_argument("--calib", required=True)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--runs", type=int, default=100, help="of each row")
-    parser.add_argument("--only", choices=("scatter", "lens"), help="rows of cameras that scatter, or of lenses that are off")
+    parser.add_argument("--only", choices=("scatter", "lens", "size"), help="rows of cameras that scatter, of lenses or of sizes that are off")
     options = parser.parse_args()
-    print("| setup | poses | answered | of them exit code 3 | the lens is named | inside of 95 % | likewise, true base and gripper | off by, rms mm | likewise "
+    print("| setup | poses | answered | of them exit code 3 | the scale is named | inside of 95 % | likewise, true base and gripper | off by, rms mm | likewise "
           "| stated, rms mm |")
     print("|" + "---|" * 10)
-    kinds = {None: (*KINDS, *LENSES), "scatter": KINDS, "lens": LENSES}[options.only]
+    kinds = {None: (*KINDS, *LENSES, *SIZES), "scatter": KINDS, "lens": LENSES, "size": SIZES}[options.only]
     with tempfile.TemporaryDirectory() as folder:
         for setup in ("eye-in-hand", "eye-to-hand"):
             for kind in kinds:
