@@ -321,6 +321,7 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   expect_own_files(outputs, files_read(options.dataset, dataset, options.common));
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
+  expect_frame_names(options.parent.empty() ? calib::camera_parent(setup) : options.parent, options.child);
   calib::CalibrateSettings settings;
   settings.use = options.use;
   settings.lens = options.lens.knowledge;
@@ -345,7 +346,6 @@ int run_handeye(const CLI::App& verb, HandEyeOptions options) {
   const int exit_code = solved.calibration.usable ? exit_done : exit_unusable;
   nlohmann::ordered_json json = calib::to_json(solved.calibration, inputs, exit_code);
   if (!options.parent.empty()) extrinsics.transform.parent = options.parent;
-  expect_frame_names(extrinsics.transform.parent, options.child);
   extrinsics.transform.child = options.child;
   json["transform"] = calib::to_json(extrinsics.transform);
   const std::string text = data::format_json(json);

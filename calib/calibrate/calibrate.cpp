@@ -18,6 +18,7 @@
 #include "calib/uncertainty/lone_view.h"
 #include "calib/uncertainty/pixel_fit.h"
 #include "data/files/error.h"
+#include "data/numbers/chi_square.h"
 #include "data/numbers/median.h"
 
 namespace flash::calib {
@@ -223,9 +224,8 @@ void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_
   const LensEstimate lens =
       lens_estimate(refined.bundle, refine_settings.bundle.unknowns, refined.covariance);
   if (lens.far_off.empty()) return;
-  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
   const Vector6d away = motion_between(result.poses.X, refined.bundle.cameras.front());
-  const bool depends = away.dot(result.covariance.ldlt().solve(away)) > kChiSquare999;
+  const bool depends = away.dot(result.covariance.ldlt().solve(away)) > data::chi_square_999_of_6;
   char text[200];
   std::snprintf(text, sizeof text,
                 "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --lens stated out",

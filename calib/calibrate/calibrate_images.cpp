@@ -10,6 +10,7 @@
 #include "calib/uncertainty/corner_noise_ratios.h"
 #include "calib/uncertainty/joint_errors.h"
 #include "data/files/error.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {
@@ -102,7 +103,6 @@ void check_time(const Dataset& dataset, const CalibrateSettings& settings, Calib
   const TimeOffset offset = offset_left(refined.bundle, with_offset.bundle.unknowns, refined.covariance);
   if (!(std::abs(offset.estimate) > 5 * offset.sd)) return;
   // The noise that the offset makes would hide what it does: that of the solution with the offset counts.
-  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
   const Vector6d away = motion_between(result.poses.X, refined.bundle.cameras.front());
   const Matrix6d covariance = refined.covariance.topLeftCorner<6, 6>();
   const bool refused = drop_noise_of_offset(refined.noise, result);
@@ -112,7 +112,7 @@ void check_time(const Dataset& dataset, const CalibrateSettings& settings, Calib
                 "%.2f deg from where it is here: leave --no-time-offset out",
                 1e3 * offset.estimate, 1e3 * offset.sd, 1e3 * away.head<3>().norm(),
                 away.tail<3>().norm() * 180 / M_PI),
-      refused || away.dot(covariance.ldlt().solve(away)) > kChiSquare999);
+      refused || away.dot(covariance.ldlt().solve(away)) > data::chi_square_999_of_6);
 }
 
 /// Names the pictures whose corners count much less than those of others.

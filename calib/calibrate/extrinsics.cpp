@@ -102,7 +102,7 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
   extrinsics.setup = calibration.setup;
   extrinsics.pixels = has_pixels(calibration);
   extrinsics.method = extrinsics.pixels ? to_string(calibration.method) : "pose_space";
-  extrinsics.transform = {in_hand ? "gripper" : "base", "camera", calibration.poses.X};
+  extrinsics.transform = {camera_parent(calibration.setup), "camera", calibration.poses.X};
   extrinsics.target_pose = {in_hand ? "base" : "gripper", "target", calibration.poses.Z};
   extrinsics.covariance = calibration.covariance;
   extrinsics.corner_px = calibration.refined.noise.corner.front();

@@ -7,6 +7,7 @@
 #include "calib/uncertainty/end_knock.h"
 #include "calib/uncertainty/motion_in_time.h"
 #include "data/files/error.h"
+#include "data/numbers/chi_square.h"
 
 namespace flash::calib {
 namespace {
@@ -169,7 +170,6 @@ std::string drift_sentence(const Drift& drift, bool depends, const std::string& 
 /// knocked: the view before which one knock would explain it nearly as well, if there is one.
 Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Observation>& all,
                            const std::string& knocked, const StillSolver& solve) {
-  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
   constexpr int kRounds = 3;
   constexpr double kLittle = 0.02;  // of the motion
   Calibration answer = whole;
@@ -187,8 +187,8 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
   }
   add_drift(answer, drift);
   const Vector6d away = motion_between(answer.poses.X, whole.poses.X);
-  const bool depends =
-      drift.camera || !drift.told || away.dot(answer.covariance.ldlt().solve(away)) > kChiSquare999;
+  const bool depends = drift.camera || !drift.told ||
+                       away.dot(answer.covariance.ldlt().solve(away)) > data::chi_square_999_of_6;
   tell_first(answer, drift_sentence(drift, depends, knocked), depends);
   answer.drift = drift;
   return answer;

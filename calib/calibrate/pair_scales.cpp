@@ -128,9 +128,8 @@ Vector6d camera_with(const Calibration& result, const std::vector<PoseLoop>& loo
 /// contradicted by what cannot be chance: an arm whose links are off looks like another size, and its errors
 /// are in the covariance.
 bool excluded(const Calibration& result, const Vector6d& away, bool stated_as_exact = false) {
-  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
   return away.dot(result.covariance.ldlt().solve(away)) >
-         (stated_as_exact ? kChiSquare999 : data::chi_square_95_of_6);
+         (stated_as_exact ? data::chi_square_999_of_6 : data::chi_square_95_of_6);
 }
 
 void tell_size(Calibration& result, const std::vector<PoseLoop>& loops,

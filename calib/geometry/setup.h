@@ -10,7 +10,8 @@ enum class Setup {
                 ///< T_gripper_target
 };
 
-const char* to_string(Setup setup);  ///< "eye-in-hand", "eye-to-hand"
+const char* to_string(Setup setup);      ///< "eye-in-hand", "eye-to-hand"
+const char* camera_parent(Setup setup);  ///< the frame of X where nobody names it: "gripper", "base"
 /// Throws data::InputError naming `source` and `field`.
 Setup parse_setup(const std::string& text, const std::string& source, const std::string& field);
 

@@ -2,10 +2,12 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "data/files/atomic_file.h"
 #include "data/files/error.h"
@@ -37,6 +39,12 @@ std::vector<double> converted(std::string_view bytes) {
   std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(Number));
   return {numbers.begin(), numbers.end()};
 }
+
+/// The numbers that are read.
+constexpr std::pair<std::string_view, std::vector<double> (*)(std::string_view)> kNumbers[] = {
+    {"<f8", converted<double>},       {"<f4", converted<float>},         {"<i8", converted<std::int64_t>},
+    {"<i4", converted<std::int32_t>}, {"<u4", converted<std::uint32_t>}, {"<u2", converted<std::uint16_t>},
+    {"<i2", converted<std::int16_t>}, {"|u1", converted<std::uint8_t>},  {"|i1", converted<std::int8_t>}};
 
 /// "(480, 640)"
 std::vector<std::size_t> shape_of(std::string_view text) {
@@ -75,10 +83,9 @@ std::string content_of(const NumpyArray& array) {
   }
   if (count_of(array.shape) == 0) return "no element";
   if (array.type[0] == '>') return "numbers with their bytes the other way round" + quoted;
-  constexpr std::string_view kRead = "<f8 <f4 <i8 <i4 <u4 <u2 <i2 |u1 |i1";
-  return (array.type.size() != 3 || kRead.find(array.type) == kRead.npos
-              ? "numbers of a type that is not read"
-              : "another number of elements than its shape says") +
+  const bool is_read = std::any_of(std::begin(kNumbers), std::end(kNumbers),
+                                   [&](const auto& known) { return known.first == array.type; });
+  return (is_read ? "another number of elements than its shape says" : "numbers of a type that is not read") +
          quoted;
 }
 
@@ -114,15 +121,8 @@ NumpyArray array_of(std::string_view npy) {
   NumpyArray array{
       .shape = shape_of(value_of(header, "'shape': (", ")")), .values = {}, .type = std::string(type)};
   std::vector<double>& values = array.values;
-  if (type == "<f8") values = converted<double>(bytes);
-  if (type == "<f4") values = converted<float>(bytes);
-  if (type == "<i8") values = converted<std::int64_t>(bytes);
-  if (type == "<i4") values = converted<std::int32_t>(bytes);
-  if (type == "<u4") values = converted<std::uint32_t>(bytes);
-  if (type == "<u2") values = converted<std::uint16_t>(bytes);
-  if (type == "<i2") values = converted<std::int16_t>(bytes);
-  if (type == "|u1") values = converted<std::uint8_t>(bytes);
-  if (type == "|i1") values = converted<std::int8_t>(bytes);
+  for (const auto& [name, convert] : kNumbers)
+    if (type == name) values = convert(bytes);
   array.whole = !type.empty() && type.size() == 3 && type[1] != 'f';
   const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
   if (columns_first && values.size() == count_of(array.shape)) values = last_index_first(values, array.shape);

@@ -10,5 +10,6 @@ inline constexpr double chi_square_95_of_6 = 12.591587;
 inline constexpr double chi_square_9875_of_6 =
     16.244520;  ///< 98.75 %: any of four is above it once in twenty
 inline constexpr double chi_square_99_of_6 = 16.811894;
+inline constexpr double chi_square_999_of_6 = 22.46;
 
 }  // namespace flash::data

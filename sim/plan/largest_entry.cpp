@@ -1,21 +1,8 @@
 #include "sim/plan/largest_entry.h"
 
+#include "sim/scene/shape_gradients.h"
+
 namespace flash::sim {
-
-namespace {
-
-/// The rows of what is one for a vertex and falls to zero at the opposite side of an element: gradients
-/// [1/m].
-template <int dimension>
-Eigen::Matrix<double, dimension + 1, dimension> shape_gradients(
-    const Eigen::Matrix<double, dimension, dimension>& inverse_edges) {
-  Eigen::Matrix<double, dimension + 1, dimension> gradients;
-  gradients.template bottomRows<dimension>() = inverse_edges;
-  gradients.row(0) = -inverse_edges.colwise().sum();
-  return gradients;
-}
-
-}  // namespace
 
 double largest_membrane_entry(const Sheet& sheet, const Body& body) {
   Eigen::VectorXd entries = Eigen::VectorXd::Zero(body.vertex_count);

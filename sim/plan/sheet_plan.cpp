@@ -8,6 +8,7 @@
 #include "sim/plan/isometric_bending.h"
 #include "sim/plan/largest_entry.h"
 #include "sim/plan/morley.h"
+#include "sim/scene/shape_gradients.h"
 
 namespace flash::sim {
 
@@ -30,9 +31,7 @@ TriangleGroup group_of(const std::vector<RestTriangle>& triangles, int first, in
   group.count = std::min(triangle_group_size, end - first);
   for (int lane = 0; lane < triangle_group_size; ++lane) {
     const RestTriangle& triangle = triangles[first + std::min(lane, group.count - 1)];
-    Eigen::Matrix<double, 3, 2> gradients;
-    gradients.bottomRows<2>() = triangle.inverse_edges;
-    gradients.row(0) = -gradients.row(1) - gradients.row(2);
+    const Eigen::Matrix<double, 3, 2> gradients = shape_gradients<2>(triangle.inverse_edges);
     std::array<int, 3> order = {0, 1, 2};
     std::sort(order.begin(), order.end(),
               [&](int a, int b) { return triangle.vertices[a] < triangle.vertices[b]; });

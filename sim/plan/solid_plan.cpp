@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "sim/scene/shape_gradients.h"
 #include "sim/scene/solid.h"
 
 namespace flash::sim {
@@ -12,14 +13,6 @@ namespace flash::sim {
 namespace {
 
 using Gradients = decltype(QuadraturePoint::gradients);
-
-/// Of the barycentric coordinates, which are the shape functions of a linear tetrahedron.
-Eigen::Matrix<double, 4, 3> barycentric_gradients(const RestTetrahedron& tetrahedron) {
-  Eigen::Matrix<double, 4, 3> gradients;
-  gradients.bottomRows<3>() = tetrahedron.inverse_edges;
-  gradients.row(0) = -tetrahedron.inverse_edges.colwise().sum();
-  return gradients;
-}
 
 /// Of the ten shape functions where the barycentric coordinates are L: L_i (2 L_i - 1) at the corners, 4 L_i
 /// L_j at the middle of an edge.
@@ -37,7 +30,7 @@ Gradients quadratic_gradients(const Eigen::Matrix<double, 4, 3>& barycentric, co
 /// the energy of small strains, which are linear in a quadratic element.
 std::vector<QuadraturePoint> quadratic_points(const RestTetrahedron& tetrahedron) {
   const double near = (5 + 3 * std::sqrt(5.0)) / 20, far = (5 - std::sqrt(5.0)) / 20;
-  const Eigen::Matrix<double, 4, 3> barycentric = barycentric_gradients(tetrahedron);
+  const Eigen::Matrix<double, 4, 3> barycentric = shape_gradients<3>(tetrahedron.inverse_edges);
   std::vector<QuadraturePoint> points;
   for (int p = 0; p < 4; ++p) {
     Eigen::Vector4d L = Eigen::Vector4d::Constant(far);
@@ -63,7 +56,8 @@ std::vector<SolidElement> solid_elements(const Sheet& sheet, const std::function
   int first_point = 0;
   for (const RestTetrahedron& tetrahedron : sheet.tetrahedra) {
     std::vector<int> vertices(tetrahedron.vertices.begin(), tetrahedron.vertices.end());
-    std::vector<QuadraturePoint> points = {{barycentric_gradients(tetrahedron), tetrahedron.volume}};
+    std::vector<QuadraturePoint> points = {
+        {shape_gradients<3>(tetrahedron.inverse_edges), tetrahedron.volume}};
     if (tetrahedron.is_quadratic()) {
       vertices.insert(vertices.end(), tetrahedron.midsides.begin(), tetrahedron.midsides.end());
       points = quadratic_points(tetrahedron);

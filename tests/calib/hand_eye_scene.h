@@ -138,4 +138,14 @@ inline Bundle seeded_bundle(const HandEyeScene& scene) {
                      shah(loops_of(scene)));
 }
 
+/// The same as pairs of poses, which no camera sees.
+inline std::vector<Observation> pairs_of(const HandEyeScene& scene) {
+  std::vector<Observation> pairs = scene.observations;
+  for (Observation& pair : pairs) {
+    pair.points.clear();
+    pair.pixels.resize(2, 0);
+  }
+  return pairs;
+}
+
 }  // namespace flash::calib

@@ -11,16 +11,6 @@
 
 namespace flash::calib {
 
-/// Without what a picture has.
-inline std::vector<Observation> pairs_of(const HandEyeScene& scene) {
-  std::vector<Observation> pairs = scene.observations;
-  for (Observation& pair : pairs) {
-    pair.points.clear();
-    pair.pixels.resize(2, 0);
-  }
-  return pairs;
-}
-
 /// Robot and camera as they stand, with noise of each.
 inline HandEyeScene noisy_scene(Setup setup, double robot_mm, double camera_mm, unsigned seed) {
   SceneSettings settings = protocol_settings(setup);

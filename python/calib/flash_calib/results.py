@@ -124,9 +124,9 @@ def load(path: str | os.PathLike, despite_doubts: bool = False) -> Calibration:
 
 def calibration_of(found, summary):
     """Of what the extension gives, and of the file."""
-    def read(name, make, absent=()):
+    def read(name, make, optional=False):
         """make(the field); a ValueError that names it where it is of another shape."""
-        value = summary[name] if absent == () else summary.get(name, absent)
+        value = summary.get(name) if optional else summary[name]
         try:
             return make(value)
         except (TypeError, ValueError, AttributeError, IndexError):
@@ -144,9 +144,9 @@ def calibration_of(found, summary):
         held_out=read("residuals", lambda r: HeldOut(r["heldout_mm"] / 1e3, math.radians(r["heldout_deg"]), r["heldout_px"])),
         noise=read("sigmas", lambda s: Noise(s["robot_rotation_rad"], s["robot_translation_m"], s["corner_px"],
                                              s.get("across_sight_m"), s.get("along_sight_m"))),
-        size=read("scale", _size, None), focal_length=read("focal_length", _size, None),
+        size=read("scale", _size, optional=True), focal_length=read("focal_length", _size, optional=True),
         weakest=read("observability", lambda w: Weakest(w["weakest"], w["weakest_mm"] / 1e3, math.radians(w["weakest_deg"]))),
-        lens=read("lens", _lens, None), summary=summary, text=found["text"])
+        lens=read("lens", _lens, optional=True), summary=summary, text=found["text"])
 
 
 def _text(value):

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "calib/calibrate/calibrate.h"
+#include "data/numbers/chi_square.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {
@@ -66,8 +67,6 @@ INSTANTIATE_TEST_SUITE_P(HandEye, Drifts,
                          testing::Values(Case{Setup::eye_in_hand, true}, Case{Setup::eye_in_hand, false},
                                          Case{Setup::eye_to_hand, true}, Case{Setup::eye_to_hand, false}));
 
-constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
-
 TEST_P(Drifts, AreToldAsWhatTheyAreAndSolvedFor) {
   const auto& [setup, camera] = GetParam();
   HandEyeScene scene = scene_of(setup, 5);
@@ -79,7 +78,7 @@ TEST_P(Drifts, AreToldAsWhatTheyAreAndSolvedFor) {
   EXPECT_TRUE(result.drift->told);
   // A robot of 0.5 mm and 0.05 deg at 0.4 m, twenty views: a slope over their times to 0.6 mm an axis.
   EXPECT_LT((result.drift->motion - slip(0.01)).head<3>().norm(), 3e-3);
-  EXPECT_LT(squared_distance(result, scene), kChiSquare999);
+  EXPECT_LT(squared_distance(result, scene), data::chi_square_999_of_6);
   EXPECT_EQ(result.used.size(), 20U);
   EXPECT_NE(result.warnings.front().find(camera ? "the camera moved all the time" : "the target moved all"),
             std::string::npos)
@@ -96,7 +95,7 @@ TEST_P(Drifts, ThatComeToAnEndLieWithinWhatIsStated) {
   drift(scene, camera, slip(0.01), [](double t) { return 1 - (1 - t) * (1 - t); });
   const Calibration result = calibrated(scene);
   ASSERT_TRUE(result.drift);
-  EXPECT_LT(squared_distance(result, scene), kChiSquare999);
+  EXPECT_LT(squared_distance(result, scene), data::chi_square_999_of_6);
 }
 
 TEST_P(Drifts, OfThreeMillimetresAreStated) {
@@ -106,7 +105,7 @@ TEST_P(Drifts, OfThreeMillimetresAreStated) {
     drift(scene, camera, slip(0.003), [](double t) { return t; });
     const Calibration result = calibrated(scene);
     EXPECT_FALSE(result.other_part);
-    EXPECT_LT(squared_distance(result, scene), kChiSquare999) << seed;
+    EXPECT_LT(squared_distance(result, scene), data::chi_square_999_of_6) << seed;
   }
 }
 
@@ -123,7 +122,7 @@ TEST_P(Drifts, OfThreeMillimetresAreToldWhereTheRobotRepeatsToAFifthOfAMillimetr
     const Calibration result = calibrated(scene);
     // That of a target may leave the camera where it is, and is then nobody's concern.
     EXPECT_TRUE(tells_of_motion(result) || !camera) << seed;
-    EXPECT_LT(squared_distance(result, scene), kChiSquare999) << seed;
+    EXPECT_LT(squared_distance(result, scene), data::chi_square_999_of_6) << seed;
   }
 }
 

@@ -6,6 +6,7 @@
 #include "calib/calibrate/calibrate.h"
 #include "calib/calibrate/calibrate_pairs.h"
 #include "calib/calibrate/extrinsics.h"
+#include "data/numbers/chi_square.h"
 #include "tests/calib/four_axis_scene.h"
 #include "tests/data/temporary_folder.h"
 
@@ -80,7 +81,7 @@ TEST_P(FourAxes, MeasuredHeightMakesTheAnswerWhole) {
     EXPECT_TRUE(result.along->told);
     EXPECT_FALSE(warns(result, "not told"));
     const Vector6d error = motion_between(scene.truth.X, result.poses.X);
-    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.46);  // 99.9 % of chi-square, 6
+    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), data::chi_square_999_of_6);
     const ToldDeviations sd = told_deviations(result, result.covariance, Axes::parent);
     ASSERT_TRUE(sd[2]);
     EXPECT_GE(*sd[2], 0.99 * height.sd);
@@ -127,7 +128,7 @@ TEST_P(FourAxes, SmallTiltsTellThePlaceWidely) {
     EXPECT_LE(sd, 1.01 * last) << tilt;
     last = sd;
     const Vector6d error = motion_between(scene.truth.X, result.poses.X);
-    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.46) << tilt;
+    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), data::chi_square_999_of_6) << tilt;
   }
   EXPECT_LT(last, 0.02);
 }

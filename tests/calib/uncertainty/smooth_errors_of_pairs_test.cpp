@@ -50,18 +50,6 @@ TEST(LinearLoop, DerivativesAreThoseOfDifferences) {
   }
 }
 
-/// What is left of views where nobody kept the pictures.
-std::vector<Observation> pairs_of(const HandEyeScene& scene) {
-  std::vector<Observation> pairs;
-  for (const Observation& view : scene.observations) {
-    Observation& pair = pairs.emplace_back();
-    pair.image = view.image;
-    pair.T_base_gripper = view.T_base_gripper;
-    pair.T_camera_target = view.T_camera_target;
-  }
-  return pairs;
-}
-
 struct Session {
   int views = 20;
   double share = 1;  ///< of how far joints usually move
