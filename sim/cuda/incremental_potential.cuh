@@ -6,6 +6,7 @@
 #include "sim/cuda/rigid_turn.cuh"
 #include "sim/cuda/springs.cuh"
 #include "sim/cuda/vertex_records.cuh"
+#include "sim/newton/step_numbers.h"
 
 namespace flash::sim::cuda {
 
@@ -284,7 +285,9 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
     force[3 * i + 1] = own.y;
     force[3 * i + 2] = own.z;
     Triple reaction = step.held_part(i, own);
-    double uncertain = epsilon * norm(point) * (stiffness + mass * per_step);
+    const double judged = fmax(mass, step.material->areal_density * tables.least_area);
+    double uncertain = fmin(epsilon * norm(point) * (stiffness + mass * per_step),
+                            most_rounding * step.material->weight_factor * judged);
     if constexpr (Kind::most > 0)
       if (step.held_axes[i] == 0) {
         const ContactResponse contact = update_contact<Kind>(step, at.contacts, line, i, point, own);
@@ -297,8 +300,7 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
     at.residuals[3 * i] = left.x;
     at.residuals[3 * i + 1] = left.y;
     at.residuals[3 * i + 2] = left.z;
-    const double squared = dot(left, left),
-                 judged = fmax(mass, step.material->areal_density * tables.least_area);
+    const double squared = dot(left, left);
     added[residual] += squared;
     added[rounding] += uncertain * uncertain;
     worst = worse_of(worst, (sqrt(squared) - uncertain) / judged);

@@ -40,8 +40,11 @@ inline constexpr double weight_of_nothing =
     9.81;  ///< gravity that weights are told by where there is none [m/s^2]
 inline constexpr double vertex_tolerance = 30;  ///< of a vertex as a multiple of the body's
 inline constexpr double rounding_tolerance =
-    1e-6;                                      ///< residual over weight below which shorter steps are no help
-inline constexpr double gap_tolerance = 1e-9;  ///< on gaps and complementarity [m]
+    1e-6;  ///< residual over weight below which shorter steps are no help
+/// Residual over weight that the rounding of inertia and of elastic forces may leave. A mesh with a sliver,
+/// or a scene far away, rounds to more: such a step is not solved.
+inline constexpr double most_rounding = 1e-5;
+inline constexpr double gap_tolerance = 1e-9;     ///< on gaps and complementarity [m]
 inline constexpr double energy_tolerance = 1e-2;  ///< gain of energy, as a share of what can be converted
 inline constexpr double weight_rounding = 1e-9;   ///< way over which the work of the weight is rounding [m]
 inline constexpr double stiffness_rounding = 1e-14;  ///< of the energy of a membrane, strains being near one

@@ -70,14 +70,14 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
     double squared_rounding = 0;
     for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i) {
       const VertexConstraint* c = iterate.contacts.find(i);
-      const double stiffness = stiffnesses[b] + potential.mass()[i] / (time_step * time_step) +
-                               (c == nullptr ? 0 : norm(c->slip_stiffness)) +
-                               potential.spring_stiffness().row(i).norm();
-      const double rounding =
-          std::numeric_limits<double>::epsilon() * iterate.positions.row(i).norm() * stiffness;
-      if (!(iterate.residual.row(i).norm() <=
-            vertex_tolerance * tolerance * std::max(potential.mass()[i], least_mass) * gravity + rounding))
-        return false;
+      const double mass = potential.mass()[i], weight = std::max(mass, least_mass) * gravity,
+                   uncertain = std::numeric_limits<double>::epsilon() * iterate.positions.row(i).norm(),
+                   held = (c == nullptr ? 0 : norm(c->slip_stiffness)) +
+                          potential.spring_stiffness().row(i).norm(),
+                   rounding = uncertain * held +
+                              std::min(uncertain * (stiffnesses[b] + mass / (time_step * time_step)),
+                                       most_rounding * weight);
+      if (!(iterate.residual.row(i).norm() <= vertex_tolerance * tolerance * weight + rounding)) return false;
       squared_rounding += rounding * rounding;
     }
     if (!(rows_of(body, iterate.residual).norm() <=

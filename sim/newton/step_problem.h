@@ -49,7 +49,7 @@ struct StepProblem {
   /// much. A vertex of small cells counts as no lighter than a tenth of the mean: its weight is far below the
   /// forces between cells. The rounding of positions moves a vertex against its inertia, strains and bends
   /// what is about it, stretches the springs of holds, and turns the friction of what starts to slide: that
-  /// much more may be missing.
+  /// much more may be missing, of inertia and of elastic forces no more than most_rounding of the weight.
   bool balanced(const Iterate& iterate, double tolerance) const;
 };
 
