@@ -22,6 +22,7 @@ HOLDS = {
     "calibrate_a_camera": """
         for one in (answer, solved, warned, wrist):
             assert abs(one.T[:3, 3] - X[:3, 3]).max() < 5e-3 and one.sd[:3].max() < 3e-3
+        assert not stated.usable and abs(stated.T[:3, 3] - X[:3, 3]).max() > 10e-3  # exact, and wrong
         assert 4 < np.mean(far["repeatable"]) < 8  # of chi-square over 30 cells it is 6 +- 0.6
         assert np.mean(far["covariance"]) < np.mean(far["repeatable"])
         """}
