@@ -62,7 +62,7 @@ void LiveCameras::add(const LiveCamera& camera, std::span<const int> every, cons
   const std::vector<std::string> taken = names(), known = instances();
   if (std::find(taken.begin(), taken.end(), camera.name) != taken.end())
     throw InputError("name: found \"" + camera.name + "\", which another camera has, expected a new one");
-  check_camera(camera.lens);
+  pinhole_of(camera.lens);
   for (const std::string& seen : camera.sees) number_of("sees", seen, known);
   int frame = base_frame;
   if (!camera.carrier.empty()) {
@@ -100,23 +100,28 @@ bool LiveCameras::sees(const LiveCamera& camera, std::size_t instance) const {
   return std::find(camera.sees.begin(), camera.sees.end(), name) != camera.sees.end();
 }
 
-void LiveCameras::render(const std::string& name, std::span<const int> chosen,
-                         std::span<const Environment* const> environments, std::vector<SeenMesh> objects,
-                         const DepthPictures& pictures, int threads) const {
-  const Placed& own = cameras_[placed(name)];
+std::vector<SeenMesh> LiveCameras::meshes(std::vector<SeenMesh> objects) const {
   std::vector<SeenMesh> meshes = std::move(objects);
   for (const RigidBody& body : bodies_)
     meshes.push_back({.triangles = &body.surface.triangles,
                       .vertex_count = body.surface.vertices.rows(),
                       .vertices = {body.surface.vertices.data()},
-                      .base_from_mesh = poses_now(environments, body.frame),
                       .yields = drawn_through});
-  for (std::size_t m = 0; m < meshes.size(); ++m)
-    if (!sees(own.camera, m)) meshes[m].triangles = nullptr;
-  std::vector<Isometry3d> base_from_camera = poses_now(environments, own.frame);
+  return meshes;
+}
+
+CameraViews LiveCameras::views(const std::string& name, std::span<const int> chosen,
+                               std::span<const Environment* const> environments,
+                               std::vector<SeenMesh> objects) const {
+  const Placed& own = cameras_[placed(name)];
+  CameraViews views{own.camera.lens, poses_now(environments, own.frame), meshes(std::move(objects))};
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    views.meshes[objects_.size() + b].base_from_mesh = poses_now(environments, bodies_[b].frame);
+  for (std::size_t m = 0; m < views.meshes.size(); ++m)
+    if (!sees(own.camera, m)) views.meshes[m].triangles = nullptr;
   for (std::size_t i = 0; i < chosen.size(); ++i)
-    base_from_camera[i] = base_from_camera[i] * own.poses[static_cast<std::size_t>(chosen[i])];
-  sim::render(own.camera.lens, base_from_camera, meshes, pictures, threads);
+    views.base_from_camera[i] = views.base_from_camera[i] * own.poses[static_cast<std::size_t>(chosen[i])];
+  return views;
 }
 
 }  // namespace flash::sim

@@ -50,6 +50,13 @@ struct LiveCamera {
   std::vector<std::string> sees = {};
 };
 
+/// A picture in each of some environments.
+struct CameraViews {
+  data::CameraIntrinsics lens;
+  std::vector<Eigen::Isometry3d> base_from_camera;
+  std::vector<SeenMesh> meshes;
+};
+
 /// The cameras of a live scene. Pictures name what is seen by its instance: its number among the objects and
 /// then the rigid bodies. Numbers stay as bodies are added.
 class LiveCameras {
@@ -74,11 +81,13 @@ class LiveCameras {
   /// Throws data::InputError where there is none of that name.
   const LiveCamera& camera(const std::string& name) const;
 
-  /// A picture of each of the environments chosen. `objects`: with the vertices of these; `environments`:
-  /// they themselves, whose frames stand where they are at the time of their state.
-  void render(const std::string& name, std::span<const int> chosen,
-              std::span<const Environment* const> environments, std::vector<SeenMesh> objects,
-              const DepthPictures& pictures, int threads) const;
+  /// Objects and then the bodies, which have no poses yet.
+  std::vector<SeenMesh> meshes(std::vector<SeenMesh> objects) const;
+
+  /// What a camera sees of each of the environments chosen. `objects`: with the vertices of these;
+  /// `environments`: they themselves, whose frames stand where they are at the time of their state.
+  CameraViews views(const std::string& name, std::span<const int> chosen,
+                    std::span<const Environment* const> environments, std::vector<SeenMesh> objects) const;
 
  private:
   struct Placed {

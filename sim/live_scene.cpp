@@ -6,6 +6,7 @@
 
 #include "data/files/error.h"
 #include "sim/device_copies.h"
+#include "sim/device_pictures.h"
 #include "sim/live_forces.h"
 #include "sim/named.h"
 #include "sim/scene/scene.h"
@@ -60,6 +61,8 @@ struct LiveScene::Storage {
   LiveForces forces;
   LiveCameras cameras;
   std::unique_ptr<DeviceCopies> copies;  ///< on the device that steps; null: the processor
+  mutable std::unique_ptr<DevicePictures>
+      pictures;  ///< of the bodies that there are, once they are asked for
 
   void check_environment(int e) const {
     if (e < 0 || e >= environments)
@@ -101,21 +104,32 @@ struct LiveScene::Storage {
     return all;
   }
 
-  /// An object in the environments chosen.
+  /// An object in the environments chosen, where its worlds are.
   SeenMesh seen(const LiveObject& object, std::span<const int> chosen) const {
     SeenMesh mesh{.triangles = &object.triangles, .vertex_count = object.vertices};
+    const Tensor all = rows_of(object, worlds[object.worlds].positions());
     for (const int e : chosen)
-      mesh.vertices.push_back(worlds[object.worlds].environment(e).state.positions.data() +
-                              3 * object.first_vertex);
+      mesh.vertices.push_back(static_cast<const double*>(all.data) + e * all.strides.front());
     return mesh;
   }
 
-  /// An environment where the objects that are not lost have it.
+  /// An environment where the objects that are not lost have it. Of its state the time alone is asked for.
   const Environment* latest(int e) const {
     const auto later = [e](const Worlds& a, const Worlds& b) {
-      return a.environment(e).state.time < b.environment(e).state.time;
+      return a.given(e).state.time < b.given(e).state.time;
     };
-    return &std::max_element(worlds.begin(), worlds.end(), later)->environment(e);
+    return &std::max_element(worlds.begin(), worlds.end(), later)->given(e);
+  }
+
+  /// What draws pictures on the device that steps.
+  DevicePictures& on_device() const {
+    if (!pictures) {
+      std::vector<SeenMesh> moving;
+      for (const LiveObject& object : objects)
+        moving.push_back({.triangles = &object.triangles, .vertex_count = object.vertices});
+      pictures = std::make_unique<DevicePictures>(copies->cuda_device(), cameras.meshes(std::move(moving)));
+    }
+    return *pictures;
   }
 
   /// What the views show of all objects together.
@@ -224,6 +238,7 @@ void LiveScene::add_end_effector(const EndEffector& effector, const Tensor& pose
   live.poses = live.start_poses;
   live.closed.resize(s.every.size());
   s.cameras.add_body(rigid_body(effector, live.numbers.front().frame));
+  s.pictures.reset();
   s.forces.add(effector.name, live.numbers, s.environments);
   s.effectors.push_back(std::move(live));
 }
@@ -484,15 +499,19 @@ void LiveScene::set_camera(const std::string& name, const Chosen& environments, 
   storage_->cameras.set_poses(name, storage_->chosen_of(environments), poses);
 }
 
-void LiveScene::render(const std::string& camera, const Chosen& environments,
-                       const DepthPictures& pictures) const {
+void LiveScene::render(const std::string& camera, const Chosen& environments, const DepthPictures& pictures,
+                       Device at) const {
   const Storage& s = *storage_;
   const std::span<const int> chosen = s.chosen_of(environments);
   std::vector<SeenMesh> objects;
   for (const LiveObject& object : s.objects) objects.push_back(s.seen(object, chosen));
   std::vector<const Environment*> now;
   for (const int e : chosen) now.push_back(s.latest(e));
-  s.cameras.render(camera, chosen, now, std::move(objects), pictures, s.threads);
+  const CameraViews views = s.cameras.views(camera, chosen, now, std::move(objects));
+  if (!s.copies)
+    sim::render(views.lens, views.base_from_camera, views.meshes, pictures, s.threads);
+  else
+    s.on_device().render(views.lens, views.base_from_camera, views.meshes, pictures, at);
 }
 
 }  // namespace flash::sim

@@ -116,9 +116,11 @@ class LiveScene {
   void add_camera(const LiveCamera& camera, const Tensor& poses);
   void set_camera(const std::string& name, const Chosen& environments, const Tensor& poses);
 
-  /// Draws the environments chosen as they stand now, a picture each, in their order. What has no end reaches
-  /// `drawn_reach` past the objects' start. The same bits on any number of threads.
-  void render(const std::string& camera, const Chosen& environments, const DepthPictures& pictures) const;
+  /// Draws the environments chosen as they stand now, a picture each, in their order, where they are. What
+  /// has no end reaches `drawn_reach` past the objects' start. The same bits on any number of threads. `at`:
+  /// whose memory the pictures are in; the processor's, or that of the device that steps.
+  void render(const std::string& camera, const Chosen& environments, const DepthPictures& pictures,
+              Device at = Device::cpu) const;
 
   /// Environments as they stand. Takes as much memory as they do.
   class Saved;

@@ -1,8 +1,12 @@
 #include "python/bindings/arrays.h"
 
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string>
 #include <vector>
 
 #include "sim/device_copies.h"
@@ -77,6 +81,23 @@ nb::object view_of(const sim::Tensor& tensor, const std::shared_ptr<const void>&
 
 void bind_arrays(nb::module_& module) {
   module.def("to_host", &to_host);
+  module.def("described", [](const AnyArray& array) {
+    std::int64_t dense = 1;
+    bool contiguous = true;
+    std::vector<std::size_t> shape(array.ndim());
+    for (std::size_t k = array.ndim(); k-- > 0;) {
+      shape[k] = array.shape(k);
+      contiguous = contiguous && (array.stride(k) == dense || array.shape(k) == 1);
+      dense *= static_cast<std::int64_t>(shape[k]);
+    }
+    const nb::dlpack::dtype type = array.dtype();
+    const char* kind = type.code == static_cast<std::uint8_t>(nb::dlpack::dtype_code::Float)  ? "float"
+                       : type.code == static_cast<std::uint8_t>(nb::dlpack::dtype_code::Int)  ? "int"
+                       : type.code == static_cast<std::uint8_t>(nb::dlpack::dtype_code::UInt) ? "uint"
+                                                                                              : "other";
+    return nb::make_tuple(array.device_id(), kind + std::to_string(type.bits), nb::tuple(nb::cast(shape)),
+                          contiguous);
+  });
   module.def("placed", [](const AnyArray& array) {
     nb::list shape, strides;
     for (std::size_t k = 0; k < array.ndim(); ++k) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "python/bindings/arrays.h"
+#include "sim/device_copies.h"
 
 namespace flash::python {
 
@@ -21,9 +22,14 @@ using sim::LiveScene;
 
 namespace {
 
-/// Where a picture is written; Python has looked at its shape.
+/// Where a picture is written; Python has looked at its shape, and that all are in one memory.
 template <class Number>
-using Picture = std::optional<nb::ndarray<Number, nb::c_contig, nb::device::cpu>>;
+using Picture = std::optional<nb::ndarray<Number, nb::c_contig>>;
+
+template <class Number>
+bool is_on_device(const Picture<Number>& picture) {
+  return picture && picture->device_type() != nb::device::cpu::value;
+}
 
 template <class Number>
 Number* start_of(const Picture<Number>& picture) {
@@ -70,14 +76,19 @@ void bind_cameras(nb::class_<Simulation>& simulation) {
          const Picture<float>& depth, const Picture<float>& distance, const Picture<std::uint8_t>& instance,
          const Picture<std::int32_t>& triangle, const Picture<float>& points) {
         s.use([&](LiveScene& live) {
+          const bool there = is_on_device(depth) || is_on_device(distance) || is_on_device(instance) ||
+                             is_on_device(triangle) || is_on_device(points);
           const nb::gil_scoped_release release;
-          live.render(name, environments,
-                      {start_of(depth), start_of(distance), start_of(instance), start_of(triangle),
-                       start_of(points)});
+          const sim::KeptCudaDevice kept;
+          live.render(
+              name, environments,
+              {start_of(depth), start_of(distance), start_of(instance), start_of(triangle), start_of(points)},
+              there ? sim::Device::cuda : sim::Device::cpu);
         });
       },
-      nb::arg("camera"), nb::arg("environments"), nb::arg("depth").none(), nb::arg("distance").none(),
-      nb::arg("instance").none(), nb::arg("triangle").none(), nb::arg("points").none());
+      nb::arg("camera"), nb::arg("environments"), nb::arg("depth").noconvert().none(),
+      nb::arg("distance").noconvert().none(), nb::arg("instance").noconvert().none(),
+      nb::arg("triangle").noconvert().none(), nb::arg("points").noconvert().none());
 }
 
 }  // namespace flash::python

@@ -2,7 +2,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flash_sim import arguments
+from flash_sim import _core, arguments
+from flash_sim.device_array import CUDA_KINDS, DEFAULT_STREAM
 
 # Of each picture the type of its numbers and the length of a pixel's; () is one number.
 PICTURES = {"depth": (np.float32, ()), "distance": (np.float32, ()), "instance": (np.uint8, ()), "triangle": (np.int32, ()),
@@ -70,8 +71,8 @@ def poses(what: str, value: ArrayLike, count: int) -> np.ndarray:
     return np.concatenate([matrices[:, :3, 3], quaternions(turns)], axis=1)
 
 
-def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None) -> dict[str, np.ndarray]:
-    """Arrays for the pictures of these names: those of `out`, or new ones."""
+def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None, device: str) -> dict[str, np.ndarray]:
+    """Arrays for the pictures of these names: those of `out`, or new ones of numpy. `device`: where the simulation is."""
     if out is not None:
         if names is not None:
             raise ValueError(f"{what}: found pictures and out, expected one of them: out names its pictures")
@@ -79,7 +80,10 @@ def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None) ->
             raise TypeError(f"{what}: out: found {type(out).__name__}, expected a dict of arrays by the name of the picture")
         if not out:
             raise ValueError(f"{what}: out: found no picture, expected one array or more by the name of the picture, or None")
-        return {name: _given(f"{what}: out", name, array, shape) for name, array in out.items()}
+        places = {name: _checked(f"{what}: out", name, array, shape, device) for name, array in out.items()}
+        if len(set(places.values())) > 1:
+            raise ValueError(f"{what}: out: found arrays on {' and '.join(sorted(set(places.values())))}, expected all on one")
+        return dict(out)
     names = ("depth", "instance") if names is None else (names,) if isinstance(names, str) else names
     try:
         names = list(names)
@@ -90,17 +94,27 @@ def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None) ->
     return {name: np.empty(shape + PICTURES[name][1], PICTURES[name][0]) for name in names}
 
 
-def _given(what, name, array, shape):
+def _checked(what, name, array, shape, device):
+    """Where the array is: "cpu" or the device of the simulation."""
     arguments.one_of(what, name, list(PICTURES))
     kind, pixel = PICTURES[name]
-    if not isinstance(array, np.ndarray) or array.dtype != kind:
-        found = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
-        raise TypeError(f"{what}: {name}: found {found}, expected an array of {np.dtype(kind)}")
-    if array.shape != shape + pixel:
-        raise ValueError(f"{what}: {name}: found the shape {array.shape}, expected {shape + pixel}")
-    if not array.flags.c_contiguous or not array.flags.writeable:
+    if isinstance(array, np.ndarray):
+        place, dtype, found, dense = "cpu", array.dtype, array.shape, array.flags.c_contiguous and array.flags.writeable
+    elif hasattr(array, "__dlpack_device__") and array.__dlpack_device__()[0] in CUDA_KINDS:
+        number, dtype, found, dense = _core.described(array.__dlpack__(stream=DEFAULT_STREAM))
+        place = f"cuda:{number}"
+        if place != device:
+            raise ValueError(f"{what}: {name}: found an array on {place}, expected " +
+                             ("one of numpy" if device == "cpu" else f"one of numpy or on {device}, where it is stepped"))
+    else:
+        raise TypeError(f"{what}: {name}: found {type(array).__name__}, expected an array of {np.dtype(kind)}")
+    if dtype != np.dtype(kind).name:
+        raise TypeError(f"{what}: {name}: found {dtype}, expected an array of {np.dtype(kind)}")
+    if tuple(found) != shape + pixel:
+        raise ValueError(f"{what}: {name}: found the shape {tuple(found)}, expected {shape + pixel}")
+    if not dense:
         raise ValueError(f"{what}: {name}: found an array that is strided or read-only, expected a dense one to write to")
-    return array
+    return place
 
 
 def _unit(what, rows):

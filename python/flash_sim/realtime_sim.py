@@ -337,16 +337,17 @@ class RealtimeSim:
         triangles(body), -1 is nothing. "points" is float32 (n, height, width, 3), in the base frame [m], 0 0 0 is nothing.
         None: depth and instance.
 
-        Each call draws the state as it stands then, also after a reset, on the processor; from a CUDA device it brings a copy
-        of it. The arrays are new ones, which nobody changes, or
-        those of `out`: a dict whose arrays are written to and returned. Then its names are the pictures.
+        Each call draws the state as it stands then, also after a reset, where it is stepped. The arrays are new ones of numpy,
+        which nobody changes, or those of `out`: a dict whose arrays are written to and returned. Then its names are the pictures.
+        Of a simulation on a CUDA device they may be there as well, as torch.empty(n, height, width, device="cuda"): nothing goes
+        through the memory of the processor. They are complete when it returns.
         Other threads of Python run meanwhile.
         """
         simulation = self._ready("render")
         arguments.one_of("render: name", name, simulation.cameras())
         ids = self._ids("render", env_ids)
         width, height = simulation.camera_size(name)
-        drawn = cameras.pictures("render", pictures, (len(ids), height, width), out)
+        drawn = cameras.pictures("render", pictures, (len(ids), height, width), out, self.device)
         simulation.render(name, ids, *(drawn.get(picture) for picture in cameras.PICTURES))
         return drawn
 

@@ -8,6 +8,7 @@
 #include "sim/cuda/devices.h"
 #include "sim/cuda/feet_kernels.h"
 #include "sim/cuda/pinned_array.h"
+#include "sim/law/rigid_frame.h"
 
 namespace flash::sim::cuda {
 namespace {
@@ -15,13 +16,6 @@ namespace {
 using Place = Vector3<double>;
 
 constexpr int steps_each = 2;  // of a cloud; a step has the place of its parity, so that neighbours have two
-
-Place place_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-Frame<double> frame_from(const Eigen::Isometry3d& pose) {
-  const auto& turn = pose.linear();
-  return {place_of(turn.col(0)), place_of(turn.col(1)), place_of(turn.col(2)), place_of(pose.translation())};
-}
 
 /// Clouds one behind the other.
 struct CloudSet {
@@ -33,7 +27,7 @@ struct CloudSet {
     std::vector<Place> all;
     std::vector<int> of;
     for (std::size_t k = 0; k < clouds.size(); ++k) {
-      for (Eigen::Index i = 0; i < clouds[k].rows(); ++i) all.push_back(place_of(clouds[k].row(i)));
+      for (Eigen::Index i = 0; i < clouds[k].rows(); ++i) all.push_back(vector3(clouds[k].row(i)));
       sizes.push_back(static_cast<std::size_t>(clouds[k].rows()));
       of.resize(all.size(), static_cast<int>(k));
     }
@@ -135,7 +129,7 @@ std::vector<std::span<const SurfaceFoot>> SurfaceFeet::find(std::size_t set,
   numbers.points = static_cast<int>(clouds.points.size());
   numbers.cloud = clouds.points.data();
   numbers.surface_of = clouds.cloud_of.data();
-  numbers.surface_from_cloud = frame_from(surface_from_cloud);
+  numbers.surface_from_cloud = frame_of(surface_from_cloud);
   numbers.steps_per_second = 1 / time_step;
   check(cudaMemcpyAsync(m.times.data(), placed.data(), placed.size() * sizeof(SurfaceTime),
                         cudaMemcpyHostToDevice, cudaStreamPerThread));

@@ -10,11 +10,23 @@
 #include "data/files/error.h"
 #include "data/files/text.h"
 #include "data/machine/parallel.h"
+#include "sim/law/rigid_frame.h"
 
 namespace flash::sim {
+
+using Eigen::Isometry3d;
+
 namespace {
 
-Pinhole pinhole(const data::CameraIntrinsics& camera) {
+/// Of one entry for each picture, or one for all.
+template <class Entries>
+const auto& of_picture(const Entries& entries, std::size_t picture) {
+  return entries[entries.size() == 1 ? 0 : picture];
+}
+
+}  // namespace
+
+Pinhole pinhole_of(const data::CameraIntrinsics& camera) {
   if (camera.width < 1 || camera.height < 1)
     throw data::InputError("camera: found a picture of " + std::to_string(camera.width) + " x " +
                            std::to_string(camera.height) + " pixels, expected 1 x 1 or more");
@@ -35,15 +47,18 @@ Pinhole pinhole(const data::CameraIntrinsics& camera) {
   return {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy};
 }
 
-/// Of one entry for each picture, or one for all.
-template <class Entries>
-const auto& of_picture(const Entries& entries, std::size_t picture) {
-  return entries[entries.size() == 1 ? 0 : picture];
+Frame<double> camera_from_mesh(const SeenMesh& mesh, std::size_t picture,
+                               const Isometry3d& camera_from_base) {
+  return frame_of(mesh.base_from_mesh.empty() ? camera_from_base
+                                              : camera_from_base * of_picture(mesh.base_from_mesh, picture));
 }
 
+namespace {
+
 void check_meshes(std::span<const SeenMesh> meshes, std::size_t pictures) {
-  if (meshes.size() > 255)
-    throw data::InputError("meshes: found " + std::to_string(meshes.size()) + ", expected 255 at most");
+  if (meshes.size() > most_meshes)
+    throw data::InputError("meshes: found " + std::to_string(meshes.size()) + ", expected " +
+                           std::to_string(most_meshes) + " at most");
   const auto expect = [&](const char* what, std::size_t found) {
     if (found != 1 && found != pictures)
       throw data::InputError(std::string("meshes: found ") + what + " for " + std::to_string(found) +
@@ -56,24 +71,13 @@ void check_meshes(std::span<const SeenMesh> meshes, std::size_t pictures) {
   }
 }
 
-/// A vertex of a mesh.
-struct SeenVertex {
-  Vector3<double> place;  ///< in the frame of the camera [m]
-  ImageCorner corner;     ///< of one behind the near plane no corner
-  bool is_before() const { return place.z >= near_plane; }
-};
-
 void transform(const Pinhole& camera, const SeenMesh& mesh, std::size_t picture,
-               const Eigen::Isometry3d& camera_from_base, std::vector<SeenVertex>& seen) {
-  const Eigen::Isometry3d pose = mesh.base_from_mesh.empty()
-                                     ? camera_from_base
-                                     : camera_from_base * of_picture(mesh.base_from_mesh, picture);
+               const Isometry3d& camera_from_base, std::vector<SeenVertex>& seen) {
+  const Frame<double> frame = camera_from_mesh(mesh, picture, camera_from_base);
   const double* vertices = of_picture(mesh.vertices, picture);
   seen.resize(static_cast<std::size_t>(mesh.vertex_count));
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const Eigen::Vector3d at = pose * Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(vertices + 3 * i));
-    seen[i].place = {at.x(), at.y(), at.z()};
-    seen[i].corner = image_corner(camera, seen[i].place);
+    seen[i] = seen_vertex(camera, frame, vertices + 3 * i);
   }
 }
 
@@ -84,15 +88,6 @@ struct Canvas {
   std::vector<std::vector<double>>
       shares;  ///< of each mesh that yields, by its triangles: see yielding_share
 };
-
-/// What the inverse depth of a triangle has to be multiplied with to get that of its plane where it is moved
-/// by `yields` away from the camera: 1/z is proportional to 1 over the distance of the plane from the camera.
-double yielding_share(const Vector3<double>& a, const Vector3<double>& b, const Vector3<double>& c,
-                      double yields) {
-  const Vector3<double> normal = cross(b - a, c - a);
-  const double distance = std::abs(dot(normal, a)) / norm(normal);
-  return distance / (distance + yields);
-}
 
 /// Draws one mesh. Where it meets one that yields, `least(hit)` is the inverse depth from which on it shows.
 template <class Least>
@@ -107,23 +102,21 @@ void draw(const Pinhole& camera, const SeenMesh& mesh, std::int32_t number, cons
     const auto hit = [&](int column, int row, double inverse_depth) {
       PixelHit& own = canvas.hits[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width) +
                                   static_cast<std::size_t>(column)];
-      if (inverse_depth > own.inverse_depth || inverse_depth > least(own)) own = {inverse_depth, number, t};
+      if (is_nearer(inverse_depth, own.inverse_depth) || inverse_depth > least(own))
+        own = {inverse_depth, number, t};
     };
-    if (a.is_before() && b.is_before() && c.is_before())
-      cover(camera, a.corner, b.corner, c.corner, hit);
-    else
-      cover(camera, a.place, b.place, c.place, hit);
+    cover(camera, whole_picture(camera), a, b, c, hit);
     if (mesh.yields > 0)
       canvas.shares[static_cast<std::size_t>(number)].push_back(
           yielding_share(a.place, b.place, c.place, mesh.yields));
   }
 }
 
-void draw(const Pinhole& camera, const Eigen::Isometry3d& base_from_camera, std::span<const SeenMesh> meshes,
+void draw(const Pinhole& camera, const Isometry3d& base_from_camera, std::span<const SeenMesh> meshes,
           std::size_t picture, Canvas& canvas) {
   canvas.hits.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), {});
   canvas.shares.assign(meshes.size(), {});
-  const Eigen::Isometry3d camera_from_base = base_from_camera.inverse();
+  const Isometry3d camera_from_base = base_from_camera.inverse();
   const auto nearest = [](const PixelHit& hit) { return hit.inverse_depth; };
   const auto through = [&](const PixelHit& hit) {
     if (hit.mesh < 0 || meshes[static_cast<std::size_t>(hit.mesh)].yields == 0) return hit.inverse_depth;
@@ -142,41 +135,28 @@ void draw(const Pinhole& camera, const Eigen::Isometry3d& base_from_camera, std:
 }
 
 /// Picture number `picture` of what the pixels see.
-void write(const Pinhole& camera, const Eigen::Isometry3d& base_from_camera,
-           const std::vector<PixelHit>& hits, std::size_t picture, const DepthPictures& pictures) {
+void write(const Pinhole& camera, const Isometry3d& base_from_camera, const std::vector<PixelHit>& hits,
+           std::size_t picture, const DepthPictures& pictures) {
+  const Frame<double> camera_frame = frame_of(base_from_camera);
   std::size_t pixel = picture * hits.size();
   auto hit = hits.begin();
   for (int row = 0; row < camera.height; ++row)
-    for (int column = 0; column < camera.width; ++column, ++hit, ++pixel) {
-      const bool seen = hit->mesh >= 0;
-      const double depth = seen ? 1 / hit->inverse_depth : 0;
-      if (pictures.depth) pictures.depth[pixel] = static_cast<float>(depth);
-      if (pictures.instance) pictures.instance[pixel] = seen ? static_cast<std::uint8_t>(hit->mesh) : 255;
-      if (pictures.triangle) pictures.triangle[pixel] = hit->triangle;
-      if (!pictures.distance && !pictures.points) continue;
-      const Eigen::Vector3d ray((column - camera.cx) / camera.fx, (row - camera.cy) / camera.fy, 1);
-      if (pictures.distance) pictures.distance[pixel] = static_cast<float>(depth * ray.norm());
-      if (pictures.points)
-        Eigen::Map<Eigen::Vector3f>(pictures.points + 3 * pixel) =
-            seen ? Eigen::Vector3f((base_from_camera * (depth * ray).eval()).cast<float>())
-                 : Eigen::Vector3f(Eigen::Vector3f::Zero());
-    }
+    for (int column = 0; column < camera.width; ++column)
+      write_pixel(camera, camera_frame, *hit++, column, row, pixel++, pictures);
 }
 
 }  // namespace
 
-std::vector<PixelHit> see(const data::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_camera,
+std::vector<PixelHit> see(const data::CameraIntrinsics& camera, const Isometry3d& base_from_camera,
                           std::span<const SeenMesh> meshes) {
   Canvas canvas;
-  draw(pinhole(camera), base_from_camera, meshes, 0, canvas);
+  draw(pinhole_of(camera), base_from_camera, meshes, 0, canvas);
   return std::move(canvas.hits);
 }
 
-void check_camera(const data::CameraIntrinsics& camera) { pinhole(camera); }
-
-void render(const data::CameraIntrinsics& camera, std::span<const Eigen::Isometry3d> base_from_camera,
+void render(const data::CameraIntrinsics& camera, std::span<const Isometry3d> base_from_camera,
             std::span<const SeenMesh> meshes, const DepthPictures& pictures, int threads) {
-  const Pinhole lens = pinhole(camera);
+  const Pinhole lens = pinhole_of(camera);
   const std::size_t count = base_from_camera.size();
   check_meshes(meshes, count);
   // A worker keeps its memory from picture to picture.

@@ -6,7 +6,7 @@
 
 #include "data/camera/camera.h"
 #include "data/mesh/mesh.h"
-#include "sim/render/triangle_pixels.h"
+#include "sim/render/depth_pictures.h"
 
 namespace flash::sim {
 
@@ -22,26 +22,24 @@ struct SeenMesh {
 };
 
 /// What each pixel sees, row by row; nothing hides what lies before it. Each pixel is drawn once where two
-/// triangles share an edge. Of two at one depth the first shows. Triangles with a corner that is no number
-/// are not seen. Throws data::InputError for an empty picture, a focal length that is not above 0, a
-/// centre that is no number and a lens with distortion: pictures of depth are rectified before they are used.
+/// triangles share an edge. Of two at one depth, to single precision, the first shows. Triangles with a
+/// corner that is no number are not seen. Throws data::InputError for an empty picture, a focal length that
+/// is not above 0, a centre that is no number and a lens with distortion: pictures of depth are rectified
+/// before they are used.
 std::vector<PixelHit> see(const data::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_camera,
                           std::span<const SeenMesh> meshes);
 
-/// Throws as `see` does.
-void check_camera(const data::CameraIntrinsics& camera);
+/// Of a camera without distortion. Throws as `see` does.
+Pinhole pinhole_of(const data::CameraIntrinsics& camera);
 
-/// Where pictures go, dense, picture after picture; null: not wanted.
-struct DepthPictures {
-  float* depth = nullptr;            ///< height x width each, along the optical axis [m]; 0: nothing
-  float* distance = nullptr;         ///< along the ray [m]; 0: nothing
-  std::uint8_t* instance = nullptr;  ///< number of the mesh; 255: nothing
-  std::int32_t* triangle = nullptr;  ///< of the mesh; -1: nothing
-  float* points = nullptr;           ///< height x width x 3 each, in the base frame [m]; 0 0 0: nothing
-};
+inline constexpr std::size_t most_meshes = 255;  ///< of a picture; the number that is left is nothing
+
+/// Where the frame of a mesh stands in that of the camera of a picture.
+Frame<double> camera_from_mesh(const SeenMesh& mesh, std::size_t picture,
+                               const Eigen::Isometry3d& camera_from_base);
 
 /// A picture from each pose of `base_from_camera`. The same bits on any number of threads; 0: one a
-/// processor. Throws as `see` does, and data::InputError for more than 255 meshes and for a mesh that has
+/// processor. Throws as `see` does, and data::InputError for more than most_meshes and for a mesh that has
 /// vertices or poses for another number of pictures.
 void render(const data::CameraIntrinsics& camera, std::span<const Eigen::Isometry3d> base_from_camera,
             std::span<const SeenMesh> meshes, const DepthPictures& pictures, int threads);

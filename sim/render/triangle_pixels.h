@@ -65,29 +65,54 @@ FLASH_HOST_DEVICE inline int last_pixel(double high, int size) {
   return high < 0 ? -1 : high >= size - 1 ? size - 1 : static_cast<int>(high);
 }
 
+/// Pixels from a first to a last column, and from a first to a last row; none where a last one is before its
+/// first.
+struct PixelWindow {
+  int first_column, last_column, first_row, last_row;
+};
+
+FLASH_HOST_DEVICE inline PixelWindow whole_picture(const Pinhole& camera) {
+  return {0, camera.width - 1, 0, camera.height - 1};
+}
+
 FLASH_HOST_DEVICE inline double least(double a, double b, double c) {
   const double ab = a < b ? a : b;
   return ab < c ? ab : c;
 }
 
-/// Calls hit(column, row, inverse depth) for each pixel whose centre is in the triangle, which has both
-/// sides. 1/z is linear in the image over a triangle.
-template <class Hit>
-FLASH_HOST_DEVICE void cover(const Pinhole& camera, const ImageCorner& a, const ImageCorner& b,
-                             const ImageCorner& c, const Hit& hit) {
+/// Those of `within` that a triangle may cover.
+FLASH_HOST_DEVICE inline PixelWindow window_of(const PixelWindow& within, const ImageCorner& a,
+                                               const ImageCorner& b, const ImageCorner& c) {
+  const int column = first_pixel(least(a.u, b.u, c.u), within.last_column + 1);
+  const int row = first_pixel(least(a.v, b.v, c.v), within.last_row + 1);
+  return {column > within.first_column ? column : within.first_column,
+          last_pixel(-least(-a.u, -b.u, -c.u), within.last_column + 1),
+          row > within.first_row ? row : within.first_row,
+          last_pixel(-least(-a.v, -b.v, -c.v), within.last_row + 1)};
+}
+
+/// Twice the area of a triangle in the image [px^2], with the sign of its turn; 0 where there is none to be
+/// seen.
+FLASH_HOST_DEVICE inline double image_area(const ImageCorner& a, const ImageCorner& b, const ImageCorner& c) {
   const double area = (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u);
-  if (!(std::abs(area) > 0 && std::abs(area) < 1e300)) return;  // nor one with a corner that is no number
+  return std::abs(area) > 0 && std::abs(area) < 1e300 ? area : 0;  // nor of a corner that is no number
+}
+
+/// Calls hit(column, row, inverse depth) for each pixel of `within` whose centre is in the triangle, which
+/// has both sides. 1/z is linear in the image over a triangle.
+template <class Hit>
+FLASH_HOST_DEVICE void cover(const PixelWindow& within, const ImageCorner& a, const ImageCorner& b,
+                             const ImageCorner& c, const Hit& hit) {
+  const double area = image_area(a, b, c);
+  if (area == 0) return;
   const bool outward = area < 0;
   const ImageEdge to_a(b, c), to_b(c, a), to_c(a, b);
   const double share = 1 / area;
   const double of_a = to_a.turned ? -share : share, of_b = to_b.turned ? -share : share,
                of_c = to_c.turned ? -share : share;
-  const int u0 = first_pixel(least(a.u, b.u, c.u), camera.width);
-  const int u1 = last_pixel(-least(-a.u, -b.u, -c.u), camera.width);
-  const int v0 = first_pixel(least(a.v, b.v, c.v), camera.height);
-  const int v1 = last_pixel(-least(-a.v, -b.v, -c.v), camera.height);
-  for (int row = v0; row <= v1; ++row)
-    for (int column = u0; column <= u1; ++column) {
+  const PixelWindow window = window_of(within, a, b, c);
+  for (int row = window.first_row; row <= window.last_row; ++row)
+    for (int column = window.first_column; column <= window.last_column; ++column) {
       const double at_a = to_a.at(column, row), at_b = to_b.at(column, row), at_c = to_c.at(column, row);
       if (to_a.inside(at_a, outward) && to_b.inside(at_b, outward) && to_c.inside(at_c, outward))
         hit(column, row,
@@ -102,12 +127,12 @@ FLASH_HOST_DEVICE inline Vector3<double> at_near_plane(const Vector3<double>& be
   return {before.x + share * (behind.x - before.x), before.y + share * (behind.y - before.y), near_plane};
 }
 
-/// The same for corners in the frame of the camera [m], of what lies before the near plane.
-template <class Hit>
-FLASH_HOST_DEVICE void cover(const Pinhole& camera, const Vector3<double>& a, const Vector3<double>& b,
-                             const Vector3<double>& c, const Hit& hit) {
+/// A triangle of the frame of the camera [m] as far as it lies before the near plane: the corners of what is
+/// left, in the image, in turn. Returns how many there are, 4 at most.
+FLASH_HOST_DEVICE inline int cut_at_near_plane(const Pinhole& camera, const Vector3<double>& a,
+                                               const Vector3<double>& b, const Vector3<double>& c,
+                                               ImageCorner (&cut)[4]) {
   const Vector3<double> corners[3] = {a, b, c};
-  ImageCorner cut[4];
   int count = 0;
   for (int k = 0; k < 3; ++k) {
     const Vector3<double>&here = corners[k], &next = corners[(k + 1) % 3];
@@ -117,7 +142,16 @@ FLASH_HOST_DEVICE void cover(const Pinhole& camera, const Vector3<double>& a, co
       cut[count++] =
           image_corner(camera, here_before ? at_near_plane(here, next) : at_near_plane(next, here));
   }
-  for (int k = 2; k < count; ++k) cover(camera, cut[0], cut[k - 1], cut[k], hit);
+  return count;
+}
+
+/// The same for corners in the frame of the camera [m], of what lies before the near plane.
+template <class Hit>
+FLASH_HOST_DEVICE void cover(const Pinhole& camera, const PixelWindow& within, const Vector3<double>& a,
+                             const Vector3<double>& b, const Vector3<double>& c, const Hit& hit) {
+  ImageCorner cut[4];
+  const int count = cut_at_near_plane(camera, a, b, c, cut);
+  for (int k = 2; k < count; ++k) cover(within, cut[0], cut[k - 1], cut[k], hit);
 }
 
 }  // namespace flash::sim

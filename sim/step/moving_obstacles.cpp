@@ -72,11 +72,6 @@ int surfaces_of(const Obstacle& obstacle) {
   return std::holds_alternative<Mesh>(obstacle.shape) ? most_mesh_surfaces : 1;
 }
 
-Frame<double> frame_of(const Isometry3d& pose) {
-  return {vector3(pose.linear().col(0)), vector3(pose.linear().col(1)), vector3(pose.linear().col(2)),
-          vector3(pose.translation())};
-}
-
 MovingObstacle<double> obstacle_in_frame(const Obstacle& obstacle, double friction) {
   auto [moving, place] = described(obstacle, friction);
   moving.start = moving.end = frame_of(place);

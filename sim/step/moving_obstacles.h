@@ -3,12 +3,12 @@
 #include <vector>
 
 #include "sim/law/obstacle_step.h"
+#include "sim/law/rigid_frame.h"
 #include "sim/law/symmetric3.h"
 #include "sim/scene/environment.h"
 
 namespace flash::sim {
 
-inline Vector3<double> vector3(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 inline Vector3<double> vector3(const data::Points& rows, Eigen::Index i) {
   return {rows(i, 0), rows(i, 1), rows(i, 2)};
 }
@@ -36,8 +36,6 @@ bool stand_beside(const std::vector<Obstacle>& obstacles);
 
 /// As how many obstacles a vertex may meet it at once: a mesh by several surfaces.
 int surfaces_of(const Obstacle& obstacle);
-
-Frame<double> frame_of(const Eigen::Isometry3d& pose);
 
 /// The obstacles of an environment between the times `start` and `end` [s], with the friction on its first
 /// body.

@@ -276,6 +276,29 @@ def test_arrays_of_the_caller_are_written_to(sim):
     assert list(sim.render("eye", "points")) == ["points"]
 
 
+class There:
+    """An array of a CUDA device by its word; its memory is not looked at."""
+
+    def __init__(self, array, device=0):
+        self.array, self.device = array, device
+
+    def __dlpack_device__(self):
+        return 2, self.device
+
+    def __dlpack__(self, **_):
+        return self.array.__dlpack__()
+
+
+def test_arrays_of_another_device_are_refused(scene):
+    sim = start(scene, 3)
+    add(sim)
+    depth, instance = np.zeros((3, HEIGHT, WIDTH), np.float32), np.zeros((3, HEIGHT, WIDTH), np.uint8)
+    for out in ({"depth": There(depth)}, {"depth": depth, "instance": There(instance)}):
+        with pytest.raises(ValueError, match="found an array on cuda:0, expected one of numpy$"):
+            sim.render("eye", out=out)
+    assert not depth.any() and not instance.any()
+
+
 def test_the_listing_of_the_document_makes_a_picture(tmp_path, monkeypatch):
     listing = (ROOT / "docs/cameras.md").read_text().split("```python")[1].split("```")[0]
     monkeypatch.chdir(tmp_path)

@@ -259,3 +259,56 @@ def test_folds_with_self_contact_are_refused_on_a_device(cuda):
     with pytest.raises(ValueError, match="self-contact"):
         FoldTask(1, device="cuda")
     assert FoldTask(1).sim.device == "cpu"
+
+
+def seen(path, device):
+    sim = handed(path, device)
+    sim.add_camera("top", 64, 48, fx=60.0, fy=60.0, cx=31.5, cy=23.5, pose=flash_sim.look_at((0.1, 0.1, 0.6), (0.1, 0.1, 0)))
+    sim.add_camera("hand", 32, 24, fx=30.0, fy=30.0, cx=15.5, cy=11.5, pose=[0, 0, 0, 1, 0, 0, 0], carrier="hand")
+    return sim
+
+
+PICTURES = ("depth", "distance", "instance", "triangle", "points")
+
+
+def test_pictures_are_those_of_the_processor(tmp_path, cuda):
+    """Drawn where the state is. To where the sheets are: those of a device and of the processor differ by the tolerance."""
+    path = write_scene(tmp_path, solver=SOLVED)
+    here, there = seen(path, "cpu"), seen(path, "cuda")
+    for steps in (0, 20):
+        for sim in (here, there):
+            if steps:
+                lift(sim)
+        for camera in ("top", "hand"):
+            own, other = here.render(camera, PICTURES), there.render(camera, PICTURES)
+            if not steps:  # the same places
+                assert all(np.array_equal(own[name], other[name]) for name in PICTURES)
+            alike = own["triangle"] == other["triangle"]
+            assert alike.mean() > 0.99 and (own["instance"] == other["instance"]).mean() > 0.995
+            for name in ("depth", "distance"):
+                assert np.abs(own[name] - other[name])[alike].max() < 1e-4
+    there.reset(positions=to_host(here.positions()))
+    here.reset(positions=to_host(here.positions()))
+    for name, picture in here.render("top", PICTURES).items():
+        assert np.array_equal(picture, there.render("top", PICTURES)[name])
+    some = there.render("top", PICTURES, env_ids=[2, 0])
+    assert all(np.array_equal(some[name], there.render("top", PICTURES)[name][[2, 0]]) for name in PICTURES)
+
+
+def test_pictures_are_written_to_arrays_of_the_device(scene, cuda):
+    torch = pytest.importorskip("torch")
+    sim = seen(scene, "cuda")
+    lift(sim)
+    kinds = {"depth": torch.float32, "distance": torch.float32, "instance": torch.uint8, "triangle": torch.int32, "points": torch.float32}
+    out = {name: torch.full((3, 48, 64) + ((3,) if name == "points" else ()), 77, dtype=kind, device="cuda") for name, kind in kinds.items()}
+    drawn = sim.render("top", out=out)
+    for name, picture in sim.render("top", PICTURES).items():
+        assert drawn[name] is out[name] and np.array_equal(picture, out[name].cpu().numpy())
+    before = {name: array.clone() for name, array in out.items()}
+    shape = (3, 48, 64)
+    for bad in ({"depth": torch.zeros(shape, dtype=torch.float64, device="cuda")}, {"depth": torch.zeros(shape[1:], device="cuda")},
+                {"depth": torch.zeros(3, 64, 48, device="cuda").transpose(1, 2)}, {"depth": torch.zeros(shape)},
+                {"depth": out["depth"], "instance": np.zeros(shape, np.uint8)}):
+        with pytest.raises((ValueError, TypeError), match="render: out: .*found"):
+            sim.render("top", out=bad)
+    assert all(torch.equal(before[name], array) for name, array in out.items())

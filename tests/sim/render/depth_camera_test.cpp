@@ -11,6 +11,7 @@
 
 #include "data/files/error.h"
 #include "data/mesh/procedural_mesh.h"
+#include "tests/sim/render/drawn_pictures.h"
 
 namespace flash::sim {
 namespace {
@@ -46,23 +47,6 @@ RayHit ray_triangle(const Vector3d& origin, const Vector3d& ray, const Eigen::Ma
   RayHit hit{.edge = std::min(std::abs(within), std::abs(t - near_plane))};
   if (within >= 0 && t >= near_plane) hit.depth = t;
   return hit;
-}
-
-/// Triangles about a camera at the origin: also behind it, through its plane, and slivers.
-data::TriangleMesh triangles_about(int count, std::mt19937_64& random) {
-  std::uniform_real_distribution<double> place(-1, 1), extent(-0.4, 0.4);
-  data::TriangleMesh mesh{data::Points(3 * count, 3), data::Triangles(count, 3)};
-  for (int t = 0; t < count; ++t) {
-    const Eigen::RowVector3d centre(place(random), place(random), place(random));
-    for (int k = 0; k < 3; ++k)
-      mesh.vertices.row(3 * t + k) =
-          centre + Eigen::RowVector3d(extent(random), extent(random), extent(random));
-    if (t % 5 == 0)  // a sliver
-      mesh.vertices.row(3 * t + 2) =
-          mesh.vertices.row(3 * t) + 1e-3 * Eigen::RowVector3d(place(random), place(random), place(random));
-    mesh.triangles.row(t) << 3 * t, 3 * t + 1, 3 * t + 2;
-  }
-  return mesh;
 }
 
 TEST(DepthCameras, SeeWhatRaysMeet) {
@@ -124,9 +108,9 @@ TEST(DepthCameras, PixelsOfASharedEdgeAreDrawnOnce) {
     const auto hit = [&](int u, int v, double) { ++count[static_cast<std::size_t>(24 * v + u)]; };
     for (int k = 0; k < 4; ++k)
       if ((fan + k) % 2 == 0)
-        cover(camera, corners[k], corners[(k + 1) % 4], inner, hit);
+        cover(whole_picture(camera), corners[k], corners[(k + 1) % 4], inner, hit);
       else
-        cover(camera, inner, corners[(k + 1) % 4], corners[k], hit);
+        cover(whole_picture(camera), inner, corners[(k + 1) % 4], corners[k], hit);
     for (int v = 0; v < 24; ++v)
       for (int u = 0; u < 24; ++u) {
         const int drawn = count[static_cast<std::size_t>(24 * v + u)];
