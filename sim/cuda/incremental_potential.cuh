@@ -384,4 +384,9 @@ __device__ inline bool balanced(const StepProblem& step, const Iterate& at, doub
          at.residual <= tolerance * step.material->force_scale + at.rounding;
 }
 
+/// Whether the place where a step starts is its end.
+__device__ inline bool rests(const StepProblem& step, const Iterate& start, double tolerance) {
+  return start.residual <= start_tolerance_share * tolerance * step.material->force_scale;
+}
+
 }  // namespace flash::sim::cuda

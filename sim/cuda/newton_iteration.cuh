@@ -271,13 +271,18 @@ __device__ inline void iterate_to_balance(Work& w, StepProblem& step, ReplayStat
   const DirectionLine line{w, step};
   bool stuck = false;
   int forced_moves = 0;
-  double tolerance = start_tolerance_share * w.replay.tolerance;
-  for (int iterations = 0; iterations < w.replay.max_iterations && !balanced(step, w.now, tolerance);
+  const double tolerance = w.replay.tolerance;
+  for (int iterations = 0;
+       iterations < w.replay.max_iterations &&
+       !(iterations == 0 ? rests(step, w.now, tolerance) : balanced(step, w.now, tolerance));
        ++iterations) {
-    tolerance = w.replay.tolerance;
     ++stats.iterations;
     if (w.refactor) {
-      if (!factorize(w, step)) return;
+      if (!factorize(w, step)) {
+        // Nothing has moved: forces below the tolerance are no balance then.
+        change_common([&] { w.now.worst = INFINITY; });
+        return;
+      }
       ++stats.factorizations;
     }
     assemble_matrix(w, step, stuck);

@@ -14,6 +14,8 @@ namespace {
 
 constexpr int layers_coupled_after = 3;  ///< iterations after which friction of layers may do so
 
+constexpr double least_raise = 1e-6;  ///< of a diagonal that is not positive in single precision
+
 /// Whether layers rub on each other.
 bool layers_rub(const StepProblem& problem) { return problem.layers && problem.layers->friction() > 0; }
 
@@ -44,7 +46,17 @@ void add_layer_diagonal(const std::vector<TouchStiffness>& layers, BlockValues<d
   }
 }
 
-/// Factorizes the positive Hessian at w.now. Returns false where it is not positive definite after all.
+/// Raises the diagonal of each vertex by a share of its largest entry.
+void raise_diagonal(const BlockPattern& pattern, double share, BlockValues<double>& values) {
+  for (long i = 0; i < pattern.size; ++i) {
+    Eigen::Map<Eigen::Matrix3d> block(values.data() + 9 * i);
+    block.diagonal().array() += share * block.diagonal().maxCoeff();
+  }
+}
+
+/// Factorizes the positive Hessian at w.now. Where the inertia is lost in the rounding of the stiffness, its
+/// diagonal is raised: it is a preconditioner alone. Returns false where it is not positive definite after
+/// all.
 bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
   problem.potential.assemble(w.now.positions, Curvature::positive, false, w.values);
   for (const BodyLaw& law : problem.laws)
@@ -53,7 +65,12 @@ bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
   add_layer_diagonal(layer_stiffness(problem, w.now), w.values);
   restrict_matrix(w.plan->pattern, w.now.contacts, w.values);
   w.factored_springs = problem.potential.spring_stiffness();
-  return w.matrix.factorize(w.values);
+  if (w.matrix.factorize(w.values)) return true;
+  for (double share = least_raise; share < 1; share *= 10) {
+    raise_diagonal(w.plan->pattern, share, w.values);
+    if (w.matrix.factorize(w.values)) return true;
+  }
+  return false;
 }
 
 /// Assembles the Hessian at w.now as the matrix of the linear problem: exact, or `positive`. `coupled`: with
@@ -142,7 +159,8 @@ struct NewtonStep {
   PointOnLine start{}, trial{}, second{};
 
   int most_iterations() const { return most; }
-  bool balanced(double share) const { return problem.balanced(w.now, share * w.settings.tolerance); }
+  bool rests() const { return problem.rests(w.now, w.settings.tolerance); }
+  bool balanced() const { return problem.balanced(w.now, w.settings.tolerance); }
   bool begin_iteration() {
     ++report.iterations;
     // A spring may be a thousand times as stiff as what the factor has in its place.

@@ -26,7 +26,8 @@ FLASH_HOST_DEVICE inline bool couples_friction(double part, double step, int ite
 
 /// To balance, or until it cannot go on. A step is a line from its iterate (line_search.h), and
 /// - `most_iterations()`
-/// - `balanced(share)`: whether the iterate is in balance, to a share of the tolerance
+/// - `rests()`: whether the place where the step starts is its end, to start_tolerance_share
+/// - `balanced()`: whether the iterate is in balance, to the tolerance
 /// - `begin_iteration()`: counts it, and has a factor ready; false where there is none
 /// - `couples(iterations, whole)`: whether friction follows the normal forces, after so many iterations, of
 ///   which the last one went its `whole` way or not
@@ -41,7 +42,7 @@ FLASH_HOST_DEVICE void iterate(Step& step) {
   bool stuck = false, whole = true;
   int forced_moves = 0;
   for (int iterations = 0;
-       iterations < step.most_iterations() && !step.balanced(iterations == 0 ? start_tolerance_share : 1);) {
+       iterations < step.most_iterations() && !(iterations == 0 ? step.rests() : step.balanced());) {
     ++iterations;
     if (!step.begin_iteration()) return;
     const bool coupled = !stuck && step.couples(iterations, whole);
@@ -50,7 +51,7 @@ FLASH_HOST_DEVICE void iterate(Step& step) {
     double length = shorten(step, coupled, slope);
     whole = length == 1;
     if (!acceptable(step, coupled, slope, length)) {
-      if (step.balanced(1)) return;
+      if (step.balanced()) return;
       if (step.repeats(coupled)) continue;
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.

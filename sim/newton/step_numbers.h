@@ -7,7 +7,7 @@ namespace flash::sim {
 // Newton's iteration.
 
 /// Of the tolerance, for the place where a step starts to be taken for its end as it is. With the whole
-/// tolerance forces below it would move nothing, however long they act.
+/// tolerance forces below it would move nothing, however long they act. Nor does rounding count there.
 inline constexpr double start_tolerance_share = 1e-3;
 /// Iterations of a part of a step after which friction follows the normal forces.
 inline constexpr int coupled_after = 20;
@@ -41,9 +41,9 @@ inline constexpr double weight_of_nothing =
 inline constexpr double vertex_tolerance = 30;  ///< of a vertex as a multiple of the body's
 inline constexpr double rounding_tolerance =
     1e-6;  ///< residual over weight below which shorter steps are no help
-/// Residual over weight that the rounding of inertia and of elastic forces may leave. A mesh with a sliver,
-/// or a scene far away, rounds to more: such a step is not solved.
-inline constexpr double most_rounding = 1e-5;
+/// Residual over weight that the rounding of inertia and of elastic forces may leave. Metal foil on small
+/// cells, or a scene kilometres away, rounds to more: such a step is not solved.
+inline constexpr double most_rounding = 1e-2;
 inline constexpr double gap_tolerance = 1e-9;     ///< on gaps and complementarity [m]
 inline constexpr double energy_tolerance = 1e-2;  ///< gain of energy, as a share of what can be converted
 inline constexpr double weight_rounding = 1e-9;   ///< way over which the work of the weight is rounding [m]

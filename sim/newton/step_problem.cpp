@@ -87,4 +87,8 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
   return true;
 }
 
+bool StepProblem::rests(const Iterate& start, double tolerance) const {
+  return relative_residual(start) <= start_tolerance_share * tolerance;
+}
+
 }  // namespace flash::sim

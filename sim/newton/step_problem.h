@@ -51,6 +51,9 @@ struct StepProblem {
   /// what is about it, stretches the springs of holds, and turns the friction of what starts to slide: that
   /// much more may be missing, of inertia and of elastic forces no more than most_rounding of the weight.
   bool balanced(const Iterate& iterate, double tolerance) const;
+
+  /// Whether the place where a step starts is its end: |r| <= start_tolerance_share * tolerance * |M g|.
+  bool rests(const Iterate& start, double tolerance) const;
 };
 
 }  // namespace flash::sim

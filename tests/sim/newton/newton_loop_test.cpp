@@ -20,7 +20,8 @@ struct Told {
   int iterations = 0, directions = 0, stuck = 0, coupled = 0, renewed = 0, moved = 0, accepted = 0;
 
   int most_iterations() const { return most; }
-  bool balanced(double share) const { return residual <= share; }
+  bool rests() const { return residual <= start_tolerance_share; }
+  bool balanced() const { return residual <= 1; }
   bool begin_iteration() {
     ++iterations;
     return true;
