@@ -22,9 +22,10 @@ using Eigen::Isometry3d;
 
 namespace {
 
-/// Keys of the pictures that are drawn together [bytes]. With 32 MB, which stay in the second cache of an
-/// H200, pictures took a tenth longer there: kernels are launched for all at once.
-constexpr std::size_t keys_at_once = 200'000'000;
+/// What the pictures that are drawn together may need beside themselves [bytes]: keys, vertices as they are
+/// seen, and triangles that wait. With 32 MB, which stay in the second cache of an H200, pictures took a
+/// tenth longer there.
+constexpr std::size_t memory_at_once = 200'000'000;
 constexpr std::size_t most_at_once = 65'535;  // blocks of a grid along its second axis
 
 /// Moves pictures on by so many pixels; those that are not wanted stay so.
@@ -133,8 +134,10 @@ void DevicePictures::render(const data::CameraIntrinsics& camera,
       }
     }
     const std::size_t pixels = static_cast<std::size_t>(lens.width) * static_cast<std::size_t>(lens.height),
-                      together = std::clamp<std::size_t>(keys_at_once / (2 * sizeof(std::uint64_t) * pixels),
-                                                         1, std::min(most_at_once, frames.size()));
+                      each = 2 * pixels * sizeof(std::uint64_t) + s.all_vertices * sizeof(SeenVertex) +
+                             s.all_triangles * sizeof(cuda::LargeTriangle),
+                      together = std::clamp<std::size_t>(memory_at_once / each, 1,
+                                                         std::min(most_at_once, frames.size()));
     s.placed.hold(placed.size());
     s.placed.write(0, placed.data(), placed.size());
     s.frames.hold(frames.size());

@@ -81,7 +81,7 @@ nb::object view_of(const sim::Tensor& tensor, const std::shared_ptr<const void>&
 
 void bind_arrays(nb::module_& module) {
   module.def("to_host", &to_host);
-  module.def("described", [](const AnyArray& array) {
+  module.def("described", [](const nb::ndarray<>& array) {
     std::int64_t dense = 1;
     bool contiguous = true;
     std::vector<std::size_t> shape(array.ndim());
@@ -96,7 +96,7 @@ void bind_arrays(nb::module_& module) {
                        : type.code == static_cast<std::uint8_t>(nb::dlpack::dtype_code::UInt) ? "uint"
                                                                                               : "other";
     return nb::make_tuple(array.device_id(), kind + std::to_string(type.bits), nb::tuple(nb::cast(shape)),
-                          contiguous);
+                          contiguous, reinterpret_cast<std::uintptr_t>(array.data()), array.nbytes());
   });
   module.def("placed", [](const AnyArray& array) {
     nb::list shape, strides;

@@ -42,8 +42,8 @@ auto array_of(const Matrix& matrix) {
                   {static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols())});
 }
 
-/// What arrays on a device need: `to_host` copies one to numpy, `placed` says where it stands, `described`
-/// its device, type and shape, and whether it is dense.
+/// What arrays on a device need: `to_host` copies one to numpy, `placed` says where it stands, `described` of
+/// one that may be written to its device, type, shape, whether it is dense, and where and how long it is.
 void bind_arrays(nanobind::module_& module);
 
 }  // namespace flash::python

@@ -26,6 +26,15 @@ namespace {
 template <class Number>
 using Picture = std::optional<nb::ndarray<Number, nb::c_contig>>;
 
+/// So many numbers; an array may say otherwise of its shape than it has memory.
+template <class Number>
+void check_size(const char* name, const Picture<Number>& picture, std::size_t numbers) {
+  if (picture && picture->size() != numbers)
+    throw nb::value_error(("render: out: " + std::string(name) + ": found " +
+                           std::to_string(picture->size()) + " numbers, expected " + std::to_string(numbers))
+                              .c_str());
+}
+
 template <class Number>
 bool is_on_device(const Picture<Number>& picture) {
   return picture && picture->device_type() != nb::device::cpu::value;
@@ -76,6 +85,14 @@ void bind_cameras(nb::class_<Simulation>& simulation) {
          const Picture<float>& depth, const Picture<float>& distance, const Picture<std::uint8_t>& instance,
          const Picture<std::int32_t>& triangle, const Picture<float>& points) {
         s.use([&](LiveScene& live) {
+          const data::CameraIntrinsics& lens = live.camera(name).lens;
+          const std::size_t pixels = environments.size() * static_cast<std::size_t>(lens.width) *
+                                     static_cast<std::size_t>(lens.height);
+          check_size("depth", depth, pixels);
+          check_size("distance", distance, pixels);
+          check_size("instance", instance, pixels);
+          check_size("triangle", triangle, pixels);
+          check_size("points", points, 3 * pixels);
           const bool there = is_on_device(depth) || is_on_device(distance) || is_on_device(instance) ||
                              is_on_device(triangle) || is_on_device(points);
           const nb::gil_scoped_release release;

@@ -80,9 +80,14 @@ def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None, de
             raise TypeError(f"{what}: out: found {type(out).__name__}, expected a dict of arrays by the name of the picture")
         if not out:
             raise ValueError(f"{what}: out: found no picture, expected one array or more by the name of the picture, or None")
-        places = {name: _checked(f"{what}: out", name, array, shape, device) for name, array in out.items()}
-        if len(set(places.values())) > 1:
-            raise ValueError(f"{what}: out: found arrays on {' and '.join(sorted(set(places.values())))}, expected all on one")
+        found = {name: _checked(f"{what}: out", name, array, shape, device) for name, array in out.items()}
+        places = sorted({place for place, _, _ in found.values()})
+        if len(places) > 1:
+            raise ValueError(f"{what}: out: found arrays on {' and '.join(places)}, expected all on one")
+        spans = sorted((start, end, name) for name, (_, start, end) in found.items())
+        for (_, end, name), (start, _, other) in zip(spans, spans[1:]):
+            if start < end:
+                raise ValueError(f"{what}: out: {other}: found the memory of {name}, expected memory of its own")
         return dict(out)
     names = ("depth", "instance") if names is None else (names,) if isinstance(names, str) else names
     try:
@@ -95,26 +100,31 @@ def pictures(what: str, names, shape: tuple[int, int, int], out: dict | None, de
 
 
 def _checked(what, name, array, shape, device):
-    """Where the array is: "cpu" or the device of the simulation."""
+    """Where the array is, "cpu" or the device of the simulation, and its first and last address."""
     arguments.one_of(what, name, list(PICTURES))
     kind, pixel = PICTURES[name]
     if isinstance(array, np.ndarray):
         place, dtype, found, dense = "cpu", array.dtype, array.shape, array.flags.c_contiguous and array.flags.writeable
-    elif hasattr(array, "__dlpack_device__") and array.__dlpack_device__()[0] in CUDA_KINDS:
-        number, dtype, found, dense = _core.described(array.__dlpack__(stream=DEFAULT_STREAM))
+        start, length = array.__array_interface__["data"][0], array.nbytes
+    else:
+        try:
+            if array.__dlpack_device__()[0] not in CUDA_KINDS:
+                raise TypeError("not on a CUDA device")
+            number, dtype, found, dense, start, length = _core.described(array.__dlpack__(stream=DEFAULT_STREAM))
+        except Exception as error:  # of whoever made the array
+            raise TypeError(f"{what}: {name}: found {type(array).__name__}, expected an array of {np.dtype(kind)} to write to, of numpy or "
+                            "on a CUDA device by DLPack") from error
         place = f"cuda:{number}"
         if place != device:
             raise ValueError(f"{what}: {name}: found an array on {place}, expected " +
                              ("one of numpy" if device == "cpu" else f"one of numpy or on {device}, where it is stepped"))
-    else:
-        raise TypeError(f"{what}: {name}: found {type(array).__name__}, expected an array of {np.dtype(kind)}")
     if dtype != np.dtype(kind).name:
         raise TypeError(f"{what}: {name}: found {dtype}, expected an array of {np.dtype(kind)}")
     if tuple(found) != shape + pixel:
         raise ValueError(f"{what}: {name}: found the shape {tuple(found)}, expected {shape + pixel}")
     if not dense:
         raise ValueError(f"{what}: {name}: found an array that is strided or read-only, expected a dense one to write to")
-    return place
+    return place, start, start + length
 
 
 def _unit(what, rows):

@@ -89,9 +89,9 @@ struct Canvas {
       shares;  ///< of each mesh that yields, by its triangles: see yielding_share
 };
 
-/// Draws one mesh. Where it meets one that yields, `least(hit)` is the inverse depth from which on it shows.
-template <class Least>
-void draw(const Pinhole& camera, const SeenMesh& mesh, std::int32_t number, const Least& least,
+/// Draws one mesh. `shows(inverse depth, hit)`: whether it does where a pixel has had that hit.
+template <class Shows>
+void draw(const Pinhole& camera, const SeenMesh& mesh, std::int32_t number, const Shows& shows,
           Canvas& canvas) {
   const int* corner = mesh.triangles->data();
   const auto triangles = static_cast<std::int32_t>(mesh.triangles->rows());
@@ -102,8 +102,7 @@ void draw(const Pinhole& camera, const SeenMesh& mesh, std::int32_t number, cons
     const auto hit = [&](int column, int row, double inverse_depth) {
       PixelHit& own = canvas.hits[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width) +
                                   static_cast<std::size_t>(column)];
-      if (is_nearer(inverse_depth, own.inverse_depth) || inverse_depth > least(own))
-        own = {inverse_depth, number, t};
+      if (shows(inverse_depth, own)) own = {inverse_depth, number, t};
     };
     cover(camera, whole_picture(camera), a, b, c, hit);
     if (mesh.yields > 0)
@@ -117,18 +116,22 @@ void draw(const Pinhole& camera, const Isometry3d& base_from_camera, std::span<c
   canvas.hits.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), {});
   canvas.shares.assign(meshes.size(), {});
   const Isometry3d camera_from_base = base_from_camera.inverse();
-  const auto nearest = [](const PixelHit& hit) { return hit.inverse_depth; };
-  const auto through = [&](const PixelHit& hit) {
-    if (hit.mesh < 0 || meshes[static_cast<std::size_t>(hit.mesh)].yields == 0) return hit.inverse_depth;
-    return hit.inverse_depth *
-           canvas.shares[static_cast<std::size_t>(hit.mesh)][static_cast<std::size_t>(hit.triangle)];
+  const auto nearer = [](double inverse_depth, const PixelHit& hit) {
+    return is_nearer(inverse_depth, hit.inverse_depth);
+  };
+  const auto through = [&](double inverse_depth, const PixelHit& hit) {
+    if (nearer(inverse_depth, hit)) return true;
+    if (hit.mesh < 0 || meshes[static_cast<std::size_t>(hit.mesh)].yields == 0) return false;
+    const double share =
+        canvas.shares[static_cast<std::size_t>(hit.mesh)][static_cast<std::size_t>(hit.triangle)];
+    return inverse_depth > hit.inverse_depth * share;
   };
   for (const bool yielding : {true, false})
     for (std::size_t m = 0; m < meshes.size(); ++m) {
       if (!meshes[m].triangles || (meshes[m].yields > 0) != yielding) continue;
       transform(camera, meshes[m], picture, camera_from_base, canvas.seen);
       if (yielding)
-        draw(camera, meshes[m], static_cast<std::int32_t>(m), nearest, canvas);
+        draw(camera, meshes[m], static_cast<std::int32_t>(m), nearer, canvas);
       else
         draw(camera, meshes[m], static_cast<std::int32_t>(m), through, canvas);
     }

@@ -110,13 +110,18 @@ FLASH_HOST_DEVICE void cover(const PixelWindow& within, const ImageCorner& a, co
   const double share = 1 / area;
   const double of_a = to_a.turned ? -share : share, of_b = to_b.turned ? -share : share,
                of_c = to_c.turned ? -share : share;
+  const double lowest = least(a.inverse_depth, b.inverse_depth, c.inverse_depth),
+               highest = -least(-a.inverse_depth, -b.inverse_depth, -c.inverse_depth);
   const PixelWindow window = window_of(within, a, b, c);
   for (int row = window.first_row; row <= window.last_row; ++row)
     for (int column = window.first_column; column <= window.last_column; ++column) {
       const double at_a = to_a.at(column, row), at_b = to_b.at(column, row), at_c = to_c.at(column, row);
-      if (to_a.inside(at_a, outward) && to_b.inside(at_b, outward) && to_c.inside(at_c, outward))
-        hit(column, row,
-            at_a * of_a * a.inverse_depth + at_b * of_b * b.inverse_depth + at_c * of_c * c.inverse_depth);
+      if (to_a.inside(at_a, outward) && to_b.inside(at_b, outward) && to_c.inside(at_c, outward)) {
+        const double inverse_depth =
+            at_a * of_a * a.inverse_depth + at_b * of_b * b.inverse_depth + at_c * of_c * c.inverse_depth;
+        // Of a triangle that is seen from its edge the area is rounding, and so are its shares.
+        hit(column, row, inverse_depth < lowest ? lowest : inverse_depth > highest ? highest : inverse_depth);
+      }
     }
 }
 

@@ -299,6 +299,41 @@ def test_arrays_of_another_device_are_refused(scene):
     assert not depth.any() and not instance.any()
 
 
+class Liar(np.ndarray):
+    """Says that it is as long as asked."""
+    shape = property(lambda _: (3, HEIGHT, WIDTH))
+
+
+class Odd:
+    """Speaks DLPack, badly."""
+
+    def __init__(self, device, capsule=None):
+        self.device, self.capsule = device, capsule
+
+    def __dlpack_device__(self):
+        return self.device
+
+    def __dlpack__(self, **_):
+        return self.capsule
+
+
+def test_arrays_that_are_none_or_one_for_two_are_refused(scene):
+    sim = start(scene, 3)
+    add(sim)
+    shape = (3, HEIGHT, WIDTH)
+    one, two = np.zeros(shape, np.float32), np.zeros((4, HEIGHT, WIDTH), np.float32)
+    for out in ({"depth": one, "distance": one}, {"depth": two[:3], "distance": two[1:]}):
+        with pytest.raises(ValueError, match="render: out: distance: found the memory of depth"):
+            sim.render("eye", out=out)
+    for odd in (Odd(None), Odd(()), Odd(2), Odd((2, 0)), Odd((2, 0), 5), Odd((1, 0), one.__dlpack__())):
+        with pytest.raises(TypeError, match="render: out: depth: found Odd, expected an array of float32") as raised:
+            sim.render("eye", out={"depth": odd})
+        assert "\n" not in str(raised.value)
+    with pytest.raises(ValueError, match="render: out: depth: found 4 numbers, expected"):
+        sim.render("eye", out={"depth": np.zeros(4, np.float32).view(Liar)})
+    sim.render("eye", out={"depth": two[:3], "instance": np.zeros(shape, np.uint8)})
+
+
 def test_the_listing_of_the_document_makes_a_picture(tmp_path, monkeypatch):
     listing = (ROOT / "docs/cameras.md").read_text().split("```python")[1].split("```")[0]
     monkeypatch.chdir(tmp_path)

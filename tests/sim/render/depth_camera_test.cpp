@@ -265,5 +265,54 @@ TEST(DepthCameras, RefuseWhatIsNoCamera) {
   EXPECT_THROW(see(camera, pose, {}), data::InputError);
 }
 
+// Two sheets at one depth to rounding: the first shows, everywhere.
+TEST(DepthCameras, OfTwoAtOneDepthTheFirstShows) {
+  const data::CameraIntrinsics camera = small_camera();
+  const data::TriangleMesh sheet = data::rectangle({.cells_x = 5, .cells_y = 5});
+  data::TriangleMesh other = sheet;
+  for (const double nearer : {0.0, 1e-12, 1e-9}) {
+    other.vertices.col(2).setConstant(-nearer);
+    Isometry3d pose = Isometry3d::Identity();
+    pose.translation() = Vector3d(0.1, 0.1, -0.3);
+    const std::vector<SeenMesh> views = {seen(sheet), seen(other)};
+    int covered = 0;
+    for (const PixelHit& hit : see(camera, pose, views)) {
+      EXPECT_LE(hit.mesh, 0);
+      covered += hit.mesh == 0;
+    }
+    EXPECT_GT(covered, 100) << nearer;
+  }
+}
+
+// A sheet in the plane of the camera has no area in the picture but rounding: no depth is outside of it.
+TEST(DepthCameras, FromItsEdgeASheetIsNowhereElse) {
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> turn(-3, 3), place(-0.3, 0.3);
+  data::CameraIntrinsics camera = small_camera();
+  camera.cx = 32, camera.cy = 24;
+  const data::TriangleMesh sheet = data::rectangle({.cells_x = 5, .cells_y = 5});
+  int drawn = 0;
+  for (int k = 0; k < 2000; ++k) {
+    Isometry3d pose = Isometry3d::Identity();
+    pose.translation() = Vector3d(place(random), place(random), 0);
+    const double heading = turn(random);
+    Eigen::Matrix3d axes;
+    axes.col(2) = Vector3d(std::cos(heading), std::sin(heading), 0);
+    axes.col(0) = axes.col(2).unitOrthogonal();
+    axes.col(1) = axes.col(2).cross(axes.col(0));
+    pose.linear() = axes * Eigen::AngleAxisd(turn(random), Vector3d::UnitZ()).toRotationMatrix();
+    const Eigen::VectorXd depths =
+        (sheet.vertices.rowwise() - pose.translation().transpose()) * pose.linear().col(2);
+    const double nearest = std::max(near_plane, depths.minCoeff());
+    for (const PixelHit& hit : see(camera, pose, std::vector<SeenMesh>{seen(sheet)}))
+      if (hit.mesh >= 0) {
+        ++drawn;
+        EXPECT_GE(1 / hit.inverse_depth, nearest * (1 - 1e-12)) << k;
+        EXPECT_LE(1 / hit.inverse_depth, depths.maxCoeff() * (1 + 1e-12)) << k;
+      }
+  }
+  EXPECT_GT(drawn, 10);
+}
+
 }  // namespace
 }  // namespace flash::sim

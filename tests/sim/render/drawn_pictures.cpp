@@ -44,6 +44,8 @@ DrawnPictures::DrawnPictures(std::mt19937_64& random) {
   for (const int count : {12, 8, 20, 6}) surfaces.push_back(triangles_about(count, random));
   surfaces.push_back(surfaces[2]);  // that which yields, a millimetre beside what lies on it
   surfaces[4].vertices.array() += 1e-3;
+  surfaces.push_back(surfaces[2]);  // another one at one depth with it, to single precision
+  surfaces[5].vertices.array() += 1e-9;
   for (const data::TriangleMesh& surface : surfaces)
     meshes.push_back({.triangles = &surface.triangles,
                       .vertex_count = surface.vertices.rows(),
