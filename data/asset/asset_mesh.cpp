@@ -39,8 +39,9 @@ TriangleMesh load_rest_mesh(const Asset& asset) {
   if (asset.element_type != ElementType::triangle)
     throw input_error(asset.source, "element_type", "found TETRAHEDRON, expected TRIANGLE: a sheet");
   if (is_tet_mesh_spec(asset.mesh))
-    throw input_error(asset.source, "mesh",
-                      "found \"" + asset.mesh + "\", expected sheet:..., disc:..., tshirt:... or a file");
+    throw input_error(
+        asset.source, "mesh",
+        "found \"" + asset.mesh + "\", expected sheet:..., disc:..., tshirt:..., shorts:... or a file");
   TriangleMesh mesh = is_mesh_spec(asset.mesh) ? parse_mesh_spec(asset.mesh, asset.source, "mesh")
                                                : load_triangle_mesh(asset.mesh);
   check_size(asset, mesh.vertices);

@@ -12,6 +12,7 @@
 #include "data/files/error.h"
 #include "data/files/text.h"
 #include "data/mesh/delaunay.h"
+#include "data/mesh/shorts.h"
 #include "data/mesh/tshirt.h"
 
 namespace flash::data {
@@ -228,13 +229,14 @@ const char* to_string(DiagonalPattern pattern) {
 }
 
 bool is_mesh_spec(const std::string& text) {
-  return text.starts_with("sheet:") || text.starts_with("disc:") || text.starts_with("tshirt:");
+  return text.starts_with("sheet:") || text.starts_with("disc:") || text.starts_with("tshirt:") ||
+         text.starts_with("shorts:");
 }
 
 TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source, const std::string& field) {
   const auto fail = [&](const std::string& expected) { return refused(spec, source, field, expected); };
   const std::string form =
-      "sheet:WIDTHxHEIGHT:CELL[:PATTERN], disc:RADIUS:CELL or tshirt:CELL in metres, such as "
+      "sheet:WIDTHxHEIGHT:CELL[:PATTERN], disc:RADIUS:CELL, tshirt:CELL or shorts:CELL in metres, such as "
       "sheet:0.4x0.4:0.01";
   const auto length = [&](std::string_view word) {
     const std::optional<double> value = parse_number(word);
@@ -242,13 +244,22 @@ TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source,
     return *value;
   };
   const std::vector<std::string_view> parts = split(spec, ":");
+  const auto garment_cell = [&](double largest) {
+    constexpr double smallest = 1e-3;
+    const double cell = parts.size() == 2 ? length(parts[1]) : length("");
+    if (cell < smallest || cell > largest)
+      throw fail("cells from " + format_short(smallest) + " to " + format_short(largest) + " m");
+    return cell;
+  };
   if (spec.starts_with("tshirt:")) {
     TshirtMesh settings;
-    constexpr double smallest = 1e-3;
-    settings.cell = parts.size() == 2 ? length(parts[1]) : length("");
-    if (settings.cell < smallest || settings.cell > settings.sleeve / 4)
-      throw fail("cells from 0.001 to 0.0425 m");
+    settings.cell = garment_cell(settings.sleeve / 4);
     return tshirt(settings);
+  }
+  if (spec.starts_with("shorts:")) {
+    ShortsMesh settings;
+    settings.cell = garment_cell(settings.leg / 4);
+    return shorts(settings);
   }
   if (!is_mesh_spec(spec) || parts.size() < 3) throw fail(form);
   const double cell = length(parts[2]);

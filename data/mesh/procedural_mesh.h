@@ -35,9 +35,9 @@ TriangleMesh disc(double radius, double cell);
 TetMesh tet_box(const Eigen::Vector3d& size, const Eigen::Vector3i& cells);
 
 /// "sheet:0.278x0.278:0.01[:pattern]" (pattern one_way, alternating, alternating_by_row, jittered, delaunay)
-/// or "disc:0.2:0.01" or "tshirt:0.014" (data/mesh/tshirt.h); the last length is the cell, rounded so that a
-/// whole number of cells fits, and at most the shorter side, or the radius. Throws InputError naming `source`
-/// and `field`, which is empty where the source is an option.
+/// or "disc:0.2:0.01" or "tshirt:0.014", "shorts:0.014" (data/mesh/tshirt.h, shorts.h); the last length is
+/// the cell, rounded so that a whole number of cells fits, and at most the shorter side, or the radius.
+/// Throws InputError naming `source` and `field`, which is empty where the source is an option.
 bool is_mesh_spec(const std::string& text);
 TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source = "mesh",
                              const std::string& field = "sheet");

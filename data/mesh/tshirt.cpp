@@ -1,12 +1,10 @@
 #include "data/mesh/tshirt.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
-#include <vector>
 
 #include "data/files/error.h"
+#include "data/mesh/two_layers.h"
 
 namespace flash::data {
 namespace {
@@ -59,50 +57,13 @@ TriangleMesh tshirt(const TshirtMesh& s) {
     throw InputError(
         "mesh: a T-shirt needs cells of at most a quarter of its sleeves, and armholes below its length");
 
-  std::vector<Eigen::Vector3d> vertices;
-  std::vector<Eigen::Vector3i> triangles;
-  std::map<std::array<int, 2>, int> seams;
-  for (const bool front : {false, true}) {
-    std::map<std::array<int, 2>, int> layer;
-    for (int j = 0; j <= cells.up; ++j)
-      for (int i = -cells.sleeve; i <= cells.across + cells.sleeve; ++i) {
-        if (!cells.has(i, j)) continue;
-        const bool sewn = is_sewn(s, cells, i, j);
-        if (sewn && front) continue;
-        const double z = sewn ? 0.5 * s.apart : front ? s.apart : 0;
-        (sewn ? seams : layer)[{i, j}] = static_cast<int>(vertices.size());
-        const Eigen::Vector2d place = place_of(s, cells, i, j, front);
-        vertices.emplace_back(place.x(), place.y(), z);
-      }
-    const auto vertex = [&](int i, int j) {
-      const auto seam = seams.find({i, j});
-      return seam != seams.end() ? seam->second : layer.at({i, j});
-    };
-    const auto add = [&](int a, int b, int c) {
-      triangles.emplace_back(front ? Eigen::Vector3i(a, b, c) : Eigen::Vector3i(a, c, b));
-    };
-    for (int j = 0; j < cells.up; ++j)
-      for (int i = -cells.sleeve; i < cells.across + cells.sleeve; ++i) {
-        if (!cells.has(i, j) || !cells.has(i + 1, j)) continue;
-        const int a = vertex(i, j), b = vertex(i + 1, j), c = vertex(i, j + 1), d = vertex(i + 1, j + 1);
-        if ((i + j) % 2 == 0) {
-          add(a, b, d);
-          add(a, d, c);
-        } else {
-          add(a, b, c);
-          add(b, d, c);
-        }
-      }
-  }
-
-  TriangleMesh mesh;
-  mesh.vertices.resize(static_cast<Eigen::Index>(vertices.size()), 3);
-  for (std::size_t k = 0; k < vertices.size(); ++k)
-    mesh.vertices.row(static_cast<Eigen::Index>(k)) = vertices[k].transpose();
-  mesh.triangles.resize(static_cast<Eigen::Index>(triangles.size()), 3);
-  for (std::size_t k = 0; k < triangles.size(); ++k)
-    mesh.triangles.row(static_cast<Eigen::Index>(k)) = triangles[k].transpose();
-  return mesh;
+  return two_layers({.first_column = -cells.sleeve,
+                     .last_column = cells.across + cells.sleeve,
+                     .last_row = cells.up,
+                     .has = [&](int i, int j) { return cells.has(i, j); },
+                     .is_sewn = [&](int i, int j) { return is_sewn(s, cells, i, j); },
+                     .place = [&](int i, int j, bool front) { return place_of(s, cells, i, j, front); },
+                     .apart = s.apart});
 }
 
 }  // namespace flash::data

@@ -57,4 +57,9 @@ FOLDS = {
     "tshirt": Fold(str(SCENES / "tshirt.json"),
                    ((Carry("left", (0, 0.7), (0.41, 0.7)),), (Carry("right", (1, 0.7), (0.59, 0.7)),),
                     (Carry("left", (0.25, 0), (0.25, 0.9)), Carry("right", (0.75, 0), (0.75, 0.9))))),
+    # The left half over the right one, then the hems up, and what is left once more.
+    "shorts": Fold(str(SCENES / "shorts.json"),
+                   ((Carry("left", (0, 0), (1, 0)), Carry("right", (0.05, 1), (0.95, 1))),
+                    (Carry("left", (0.57, 0), (0.55, 0.65)), Carry("right", (1, 0), (0.97, 0.65))),
+                    (Carry("left", (0.55, 0.35), (0.53, 1)), Carry("right", (0.97, 0.35), (0.95, 1))))),
 }
