@@ -21,7 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 HEADER = "sim/newton/step_numbers.h"
 NUMBER = re.compile(r"inline constexpr (double|int) ([^;]*);")
 LENGTHS = ("most_directions", "most_halvings")  # of arrays
-TESTS = "LineSearch.*:NewtonLoop.*:StepEnd.*:Krylov.*"
+TESTS = "LineSearch.*:NewtonLoop.*:StepEnd.*:StepProblem.*:Krylov.*"
 READ = """
 #include <cstdlib>
 #include <cstring>

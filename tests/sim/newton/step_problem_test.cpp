@@ -110,6 +110,29 @@ TEST(StepProblem, WhatRoundsToMoreThanItsShareOfTheWeightIsNotSolved) {
   EXPECT_FALSE(step_of_steel({3000, -2000, 1000}, 9.81).converged);
 }
 
+// A plate far from the origin, whose forces round to more than its weight, may miss the tolerance by a
+// hundredth of it.
+TEST(StepProblem, RoundingCountsUpToAHundredthOfTheWeight) {
+  const auto plan = make_sheet_plan(small_sheet());
+  Environment environment = environment_of(plan->sheet);
+  environment.gravity = {0, 0, -9.81};
+  environment.state.positions.rowwise() += Eigen::RowVector3d(1e5, 0, 0);
+  environment.materials[0].membrane_stiffness = 1e9;
+  const StepProblem problem(*plan, environment, 0.01, {.speed = 1});
+  Iterate iterate;
+  iterate.positions = environment.state.positions;
+  iterate.contacts = begin_step(problem.contacts, iterate.positions);
+  problem.evaluate(iterate);
+  const auto misses = [&](double share) {
+    iterate.residual.setZero();
+    iterate.residual.col(2) = share * 9.81 * problem.potential.mass();
+    return !problem.balanced(iterate, 1e-3);
+  };
+  EXPECT_FALSE(misses(0.0109));
+  EXPECT_TRUE(misses(0.0111));
+  EXPECT_FALSE(problem.rests(iterate, 1e-3));
+}
+
 /// A square sheet with a sliver so high at the middle of an edge [m].
 std::shared_ptr<const SheetPlan> sheet_with_sliver(int cells, double side, double height) {
   data::TriangleMesh mesh = small_sheet(cells, side).rest;
