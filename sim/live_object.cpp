@@ -27,4 +27,20 @@ LiveObject live_object(const Sheet& sheet, std::size_t body, std::string name, s
           .vertices = part.vertex_count};
 }
 
+Tensor rows_of(const LiveObject& object, Tensor all) {
+  const std::int64_t vertices = all.shape[1];
+  all.data = static_cast<const double*>(all.data) + 3 * object.first_vertex;
+  all.shape[1] = object.vertices;
+  all.strides = {3 * vertices, 3, 1};
+  return all;
+}
+
+SeenMesh seen(const LiveObject& object, const Tensor& positions, std::span<const int> chosen) {
+  SeenMesh mesh{.triangles = &object.triangles, .vertex_count = object.vertices};
+  const Tensor own = rows_of(object, positions);
+  for (const int e : chosen)
+    mesh.vertices.push_back(static_cast<const double*>(own.data) + e * own.strides.front());
+  return mesh;
+}
+
 }  // namespace flash::sim

@@ -95,24 +95,6 @@ struct LiveScene::Storage {
     return effectors[number_of("end effector", name, effector_names())];
   }
 
-  /// Rows of one object in a view of its worlds.
-  static Tensor rows_of(const LiveObject& object, Tensor all) {
-    const std::int64_t vertices = all.shape[1];
-    all.data = static_cast<const double*>(all.data) + 3 * object.first_vertex;
-    all.shape[1] = object.vertices;
-    all.strides = {3 * vertices, 3, 1};
-    return all;
-  }
-
-  /// An object in the environments chosen, where its worlds are.
-  SeenMesh seen(const LiveObject& object, std::span<const int> chosen) const {
-    SeenMesh mesh{.triangles = &object.triangles, .vertex_count = object.vertices};
-    const Tensor all = rows_of(object, worlds[object.worlds].positions());
-    for (const int e : chosen)
-      mesh.vertices.push_back(static_cast<const double*>(all.data) + e * all.strides.front());
-    return mesh;
-  }
-
   /// An environment where the objects that are not lost have it. Of its state the time alone is asked for.
   const Environment* latest(int e) const {
     const auto later = [e](const Worlds& a, const Worlds& b) {
@@ -399,12 +381,12 @@ void LiveScene::stop() { storage_->stop = true; }
 
 Tensor LiveScene::positions(const std::string& object) const {
   const LiveObject& own = storage_->object(object);
-  return Storage::rows_of(own, storage_->worlds[own.worlds].positions());
+  return rows_of(own, storage_->worlds[own.worlds].positions());
 }
 
 Tensor LiveScene::velocities(const std::string& object) const {
   const LiveObject& own = storage_->object(object);
-  return Storage::rows_of(own, storage_->worlds[own.worlds].velocities());
+  return rows_of(own, storage_->worlds[own.worlds].velocities());
 }
 
 Tensor LiveScene::force(const std::string& name) const {
@@ -504,7 +486,8 @@ void LiveScene::render(const std::string& camera, const Chosen& environments, co
   const Storage& s = *storage_;
   const std::span<const int> chosen = s.chosen_of(environments);
   std::vector<SeenMesh> objects;
-  for (const LiveObject& object : s.objects) objects.push_back(s.seen(object, chosen));
+  for (const LiveObject& object : s.objects)
+    objects.push_back(seen(object, s.worlds[object.worlds].positions(), chosen));
   std::vector<const Environment*> now;
   for (const int e : chosen) now.push_back(s.latest(e));
   const CameraViews views = s.cameras.views(camera, chosen, now, std::move(objects));
