@@ -1,4 +1,6 @@
 #pragma once
+#include <benchmark/benchmark.h>
+
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -58,5 +60,11 @@ struct PicturesScene {
     meshes.push_back({&table.triangles, 4, {table.vertices.data()}});
   }
 };
+
+/// The time of each picture where so many are drawn at a time.
+inline benchmark::Counter time_of_a_picture(std::size_t pictures) {
+  return {static_cast<double>(pictures),
+          benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert};
+}
 
 }  // namespace flash::sim::bench
