@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 
 from flash_sim import _core, arguments, cameras
 from flash_sim.asset import Asset
-from flash_sim.device_array import DeviceArray, DeviceStatus
+from flash_sim.device_array import DeviceArray, DeviceStatus, to_host
 
 STATUS = np.dtype([(name, np.float64) for name in
                    ("steps", "time", "converged", "residual", "penetration", "parts", "lost")])
@@ -85,7 +85,7 @@ class RealtimeSim:
         through. When it closes it holds all vertices within `reach` [m] of the box.
         """
         simulation = self._ready("add_ee")
-        taken = self.status()["steps"]
+        taken = to_host(self.status()["steps"])
         if taken.any():
             raise ValueError(f"add_ee: found {taken.max():.0f} steps taken since initialize() or reset(), expected end effectors to be "
                              "added before the first step of all environments")

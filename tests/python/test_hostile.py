@@ -6,6 +6,7 @@ import pytest
 from conftest import start, write_scene
 
 import flash_sim
+from flash_sim.device_array import DeviceArray
 
 NAN, INF = float("nan"), float("inf")
 BAD_POSES = [NAN, [NAN] * 7, [0, 0, INF], [0] * 7, [0, 0, 0, 0, 0, 0, 2], [0] * 6, [[0] * 7] * 2, np.zeros((3, 3, 7)), "up", None,
@@ -98,6 +99,18 @@ def test_no_scene_and_no_device():
         with pytest.raises((ValueError, TypeError), match="^device") as raised:
             flash_sim.RealtimeSim(device=device)
         assert "--" not in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_end_effectors_are_added_where_the_steps_are_counted_on_a_device(sim, monkeypatch):
+    """Arrays of a device have none of numpy's methods."""
+    for steps in (0, 2):
+        count = np.full(sim.n_envs, float(steps))
+        monkeypatch.setattr(sim, "status", lambda count=count: {"steps": DeviceArray(lambda: count, count.copy)})
+        if steps:
+            with pytest.raises(ValueError, match="add_ee: found 2 steps taken"):
+                sim.add_ee("late", [0, 0, 1])
+        else:
+            sim.add_ee("first", [0, 0, 1])
 
 
 def test_end_effectors_come_before_the_first_step(sim):
