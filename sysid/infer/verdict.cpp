@@ -87,13 +87,8 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
       const auto open = [&](bool high) {
         return posterior.ends(static_cast<Eigen::Index>(k), high ? 1 : 0) < kExcluded;
       };
-      // So may what draws are cut off at.
-      const double first = coordinate_of(range, range.values.front()),
-                   last = coordinate_of(range, range.values.back());
       const double mode = posterior.estimate[static_cast<Eigen::Index>(k)];
       const RangeEdge edge = edge_of(range, mode);
-      const bool below = open(false) || posterior.quantile(k, 0.025) <= first || edge == RangeEdge::low,
-                 above = open(true) || posterior.quantile(k, 0.975) >= last || edge == RangeEdge::high;
       // The most likely values of all parameters together may lie beyond what is likely of one by itself.
       double low = std::min(mode, posterior.quantile(k, 0.025)),
              high = std::max(mode, posterior.quantile(k, 0.975));
@@ -101,6 +96,9 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
         low = std::min(low, posterior.reach(static_cast<Eigen::Index>(k), 0));
         high = std::max(high, posterior.reach(static_cast<Eigen::Index>(k), 1));
       }
+      // So may what the range cuts off.
+      const bool below = open(false) || edge_of(range, low) == RangeEdge::low,
+                 above = open(true) || edge_of(range, high) == RangeEdge::high;
       finding.interval95 = {below ? range.values.front() : value_of(looked, low),
                             above ? range.values.back() : value_of(looked, high)};
       const std::array<double, 2> usual = usual_of(range, base);

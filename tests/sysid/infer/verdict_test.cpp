@@ -184,6 +184,8 @@ TEST(Verdict, OfAbruptMotionsIsWhatTheSearchedValuesTell) {
   const ParameterFinding coarse = found_by_points("5e-6:2e-4:2:log");
   EXPECT_LT(*coarse.bits, 1);
   EXPECT_EQ(coarse.identifiable, Identifiable::no);
+  // Where all of a range is likely, it tells nothing, however narrow it is.
+  EXPECT_EQ(found_by_points("5e-5:8e-5:2:log").identifiable, Identifiable::no);
 }
 
 TEST(Verdict, AnEstimateBeyondTheQuantilesIsInsideItsInterval) {
