@@ -298,7 +298,7 @@ void add_synth_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   add_grasp_cell_option(*verb, synth.grasp_cell);
   verb->add_option("--grasp-shape", options->grasp_shape, "How the patch sits in the fingers")
-      ->check(CLI::IsMember({"clamp", "point"}))
+      ->check(CLI::IsMember({"clamp", "point", "pinch"}))
       ->capture_default_str();
   verb->add_option("--camera", options->cameras,
                    "Position x,y,z of a camera [m], aimed at the sheet; repeat for more")

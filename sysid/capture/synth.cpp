@@ -121,6 +121,9 @@ void check(const SynthSettings& settings) {
     for (const SynthCamera& camera : settings.cameras)
       within("--camera", camera.base_from_camera.translation()[k], -kFarthest, kFarthest, " m");
   }
+  if (settings.kind == "bar_pull" && settings.grasp_shape == data::GraspShape::pinch)
+    throw data::InputError("--grasp-shape: found pinch, which folds a corner, expected clamp or point for " +
+                           settings.kind);
   if (settings.cameras.empty()) throw data::InputError("--camera: found none, expected at least one");
   if (!(settings.dropped >= 0 && settings.dropped < 1))
     throw data::InputError("--dropped: found " + std::to_string(settings.dropped) +
@@ -150,6 +153,7 @@ data::Recording recording_of(const data::TriangleMesh& mesh, const std::string& 
     grasp.gripper = hand.name;
     grasp.select = hand.select;
     grasp.shape = settings.grasp_shape;
+    if (grasp.shape == data::GraspShape::pinch) grasp.depth = settings.grasp_within;
     recording.trajectories[hand.name] =
         smooth_motion(patch_middle(recording, grasp).transpose(), hand.displacement, settings);
     recording.grasps.push_back(grasp);
@@ -292,7 +296,9 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   sim::Sheet sheet = sim::make_sheet(replay.surface);
   if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
   replay.plan = sim::make_sheet_plan(sheet);
-  replay.steps = steps_in(settings.duration + settings.rest, solver.time_step);
+  const int closing = steps_in(pre_roll_of(replay.recording, replay.settings), solver.time_step);
+  replay.start = -closing * solver.time_step;
+  replay.steps = closing + steps_in(settings.duration + settings.rest, solver.time_step);
   replay.schedule = gripper_schedule(replay);
   for (const data::RecordedKeyframe& keyframe : synthetic.recording.keyframes)
     replay.observations.push_back({.t = keyframe.time + settings.time_offset});
@@ -386,8 +392,11 @@ std::string truth_text(const data::SheetMaterial& material, const SynthSettings&
                         {"stiffness_damping", material.stiffness_damping}};
   if (std::isfinite(material.yield_curvature))
     json["parameters"]["yield_curvature"] = material.yield_curvature;
-  for (const auto& [name, value] : {std::pair{"grasp_size", settings.nuisance.grasp_size},
-                                    std::pair{"grasp_stiffness", settings.nuisance.grasp_stiffness}})
+  const ReplayNuisance& grasped = settings.nuisance;
+  for (const auto& [name, value] :
+       {std::pair{"grasp_size", grasped.grasp_size}, std::pair{"grasp_stiffness", grasped.grasp_stiffness},
+        std::pair{"grasp_depth", grasped.grasp_depth}, std::pair{"grasp_direction", grasped.grasp_direction},
+        std::pair{"grasp_pitch", grasped.grasp_pitch}})
     if (value) json["parameters"][name] = *value;
   json["offset"] = {settings.cloud_offset.x(), settings.cloud_offset.y(), settings.cloud_offset.z()};
   json["time_offset"] = settings.time_offset;

@@ -29,10 +29,10 @@ struct SynthSettings {
   double duration = 3.0;                        ///< of the motion [s]
   double rest = 0.0;                            ///< recorded after it [s]
   double keyframe_rate = 10.0;                  ///< [1/s]
-  double grasp_within = 0.02;                   ///< of the corner, along each axis [m]
+  double grasp_within = 0.02;                   ///< of the corner, along each axis; of a pinch its depth [m]
   std::optional<double> grasp_cell{};           ///< as in ReplaySettings
   ReplayNuisance nuisance{};                    ///< how the sheet lies and is grasped
-  data::GraspShape grasp_shape = data::GraspShape::clamp;  ///< or point: a pinch needs time to close
+  data::GraspShape grasp_shape = data::GraspShape::clamp;  ///< pinch: closed before the recording begins
   std::vector<SynthCamera> cameras;
   double depth_noise = 0.001;  ///< along the ray [m]
   double dropped = 0.0;        ///< share of keyframes lost

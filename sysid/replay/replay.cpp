@@ -101,6 +101,13 @@ int count_steps(const data::Recording& recording, double start, double step) {
 
 }  // namespace
 
+double pre_roll_of(const data::Recording& recording, const ReplaySettings& settings) {
+  const bool closes = std::any_of(
+      recording.grasps.begin(), recording.grasps.end(),
+      [&](const data::RecordedGrasp& grasp) { return shape_of(grasp, settings) == data::GraspShape::pinch; });
+  return settings.pre_roll.value_or(closes ? 0.4 : 0.0);
+}
+
 int steps_in(double duration, double step) {
   // Time stamps since 1970 know a time to 2e-7 s.
   const double steps = std::ceil(duration / step - 1e-3);
@@ -134,11 +141,8 @@ Replay assemble(data::Recording recording_on_mesh, const ReplaySettings& setting
   check_patch(replay);
 
   replay.beginning = replay.observations.front().t;
-  bool closes = false;
-  for (const data::RecordedGrasp& grasp : recording.grasps) {
+  for (const data::RecordedGrasp& grasp : recording.grasps)
     replay.beginning = std::min(replay.beginning, grasp.from);
-    closes = closes || shape_of(grasp, settings) == data::GraspShape::pinch;
-  }
   for (const data::RecordedSupport& support : recording.supports)
     if (std::isfinite(support.from)) replay.beginning = std::min(replay.beginning, support.from);
   if (!replay.plan) {
@@ -149,9 +153,8 @@ Replay assemble(data::Recording recording_on_mesh, const ReplaySettings& setting
   if (settings.self_contact)
     sim::check_self_contact(replay.sheet(), settings.self_contact->thickness,
                             sim::with_midsides(replay.sheet(), replay.recording.start));
-  const double pre_roll = settings.pre_roll.value_or(closes ? 0.4 : 0.0);
   const double step = settings.solver.time_step;
-  replay.start = replay.beginning - steps_in(pre_roll, step) * step;
+  replay.start = replay.beginning - steps_in(pre_roll_of(recording, settings), step) * step;
   replay.steps = count_steps(recording, replay.start, step);
   check_grasps_act(replay);
   replay.schedule = gripper_schedule(replay);

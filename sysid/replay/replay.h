@@ -96,6 +96,9 @@ struct Replay {
   const sim::Sheet& sheet() const { return plan->sheet; }
 };
 
+/// Time that is simulated before a recording starts: settings.pre_roll, or what its grasps need to close [s].
+double pre_roll_of(const data::Recording& recording, const ReplaySettings& settings);
+
 /// Steps of `step` that it takes to cover `duration` [s]. Throws data::InputError where they are more than
 /// data::max_steps.
 int steps_in(double duration, double step);

@@ -30,7 +30,8 @@ STATED = (0.017, 0.02, 0.023, 0.026)  # size of the patch [m]
 FEW_CELLS = (0.028, 0.02, 0.014)
 # Change of the case, cells, and whether the mesh is a file.
 SEARCHES = [({}, cell, False) for cell in SEARCH_CELLS] + [({}, cell, True) for cell in FEW_CELLS] + [
-    ({name: value}, cell, False) for name, value in (("grasp", "point"), ("young", 10.0), ("young", 1000.0)) for cell in FEW_CELLS]
+    ({name: value}, cell, False) for name, value in (("grasp", "point"), ("grasp", "pinch"), ("young", 10.0), ("young", 1000.0))
+    for cell in FEW_CELLS]
 
 
 def grasp_options(case):

@@ -69,6 +69,38 @@ TEST(Synth, LoadsAsARecordingAndFitsItsOwnTruthToTheNoise) {
   EXPECT_LT((fit.recordings[0].offset - settings.cloud_offset).norm(), 3e-3);
 }
 
+/// Mean distance [m] of a lift's clouds from its truth, as grasped by the shape of the settings of the replay.
+double own_truth_missed_by(const data::Recording& recording, const ReplaySettings& settings) {
+  const Replay replay = make_replay(recording, settings);
+  const ReplayResult result = std::move(run(replay, {{stiff_towel(), {}}}).front());
+  EXPECT_TRUE(result.converged);
+  ScoreSettings score;
+  score.objective.robust.kind = RobustKind::plain;
+  return score_motions({replay}, {result}, score).score;
+}
+
+TEST(Synth, APinchIsClosedBeforeTheRecordingBegins) {
+  const data::TemporaryFolder folder;
+  SynthSettings settings = short_lift();
+  settings.grasp_shape = data::GraspShape::pinch;
+  settings.grasp_within = 0.06;
+  SynthRecording synthetic = make(settings);
+  EXPECT_EQ(synthetic.unconverged_share, 0);
+  save_synthetic(synthetic, folder / "lift");
+
+  const data::Recording recording = data::load_recording(folder / "lift");
+  EXPECT_EQ(recording.grasps[0].shape, data::GraspShape::pinch);
+  EXPECT_EQ(recording.grasps[0].depth, 0.06);
+  const double fit = own_truth_missed_by(recording, {});
+  EXPECT_LT(fit, 0.8e-3);
+  ReplaySettings flat;
+  flat.grasp_shape = data::GraspShape::clamp;
+  EXPECT_GT(own_truth_missed_by(recording, flat), 2 * fit);
+
+  settings.kind = "bar_pull";
+  EXPECT_NE(data::input_error_of([&] { make(settings); }).find("--grasp-shape: found pinch"), std::string::npos);
+}
+
 TEST(Synth, ADeviceRecordsWhatTheProcessorDoes) {
   if (const std::string why = sim::why_no_cuda(); !why.empty()) GTEST_SKIP() << why;
   SynthSettings settings = short_lift();
