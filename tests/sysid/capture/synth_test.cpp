@@ -69,7 +69,8 @@ TEST(Synth, LoadsAsARecordingAndFitsItsOwnTruthToTheNoise) {
   EXPECT_LT((fit.recordings[0].offset - settings.cloud_offset).norm(), 3e-3);
 }
 
-/// Mean distance [m] of a lift's clouds from its truth, as grasped by the shape of the settings of the replay.
+/// Mean distance [m] of a lift's clouds from its truth, as grasped by the shape of the settings of the
+/// replay.
 double own_truth_missed_by(const data::Recording& recording, const ReplaySettings& settings) {
   const Replay replay = make_replay(recording, settings);
   const ReplayResult result = std::move(run(replay, {{stiff_towel(), {}}}).front());
@@ -98,7 +99,8 @@ TEST(Synth, APinchIsClosedBeforeTheRecordingBegins) {
   EXPECT_GT(own_truth_missed_by(recording, flat), 2 * fit);
 
   settings.kind = "bar_pull";
-  EXPECT_NE(data::input_error_of([&] { make(settings); }).find("--grasp-shape: found pinch"), std::string::npos);
+  EXPECT_NE(data::input_error_of([&] { make(settings); }).find("--grasp-shape: found pinch"),
+            std::string::npos);
 }
 
 TEST(Synth, ADeviceRecordsWhatTheProcessorDoes) {
