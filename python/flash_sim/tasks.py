@@ -5,7 +5,7 @@ import numpy as np
 
 from flash_sim import arguments
 from flash_sim.device_array import to_host
-from flash_sim.folds import FOLDS, Fold
+from flash_sim.folds import FOLDS, Fold, Lift
 from flash_sim.realtime_sim import RealtimeSim
 
 HOME = 0.15   # height of a hand at the start [m]
@@ -19,7 +19,7 @@ class FoldSettings:
     steps_per_action: int = 4     # of the simulation
     time_limit: int = 200         # actions per stage
     speed: float = 0.4            # of a hand at an action of 1 along each axis [m/s]
-    near: float = 0.05            # from where it is to lie, where what was carried is there [m]
+    near: float = 0.05            # from where it is to be, where what was carried is there [m]
     still: float = 0.1            # of it then, at most [m/s]
     shift: float = 0.05           # of the cloth at the start, in both directions along x and y [m]
     turn: float = 0.5             # of the cloth at the start, both ways [rad]
@@ -36,13 +36,15 @@ class FoldSettings:
 
 
 class FoldTask:
-    """A cloth is folded by stages: each hand of a stage is to lay one place of the cloth on another one, and to let go.
+    """A cloth is folded or lifted by stages: each hand of a stage is to lay one place of the cloth on another one and to let go
+    (Carry), or to lift it and to hold it (Lift).
 
     Actions (n, 4 per hand): motion along x, y and z in [-1, 1], times the speed; above 0 a hand closes, else it opens.
     Observations (n, 14 per hand, and 1 per stage where there are several) float64, of each hand: its place, where it is to take
-    minus its place, where it is to lay minus where it is to take [m]; velocity of what it is to take [m/s]; whether it is closed,
-    whether it carries anything. A hand that a stage does not need sees zeros there. Then which stage it is. A stage is done when
-    all it carries lies within `near` of where it is to lie, let go and at rest, and the last one is the success.
+    minus its place, where it is to lay or to hold minus where it is to take [m]; velocity of what it is to take [m/s]; whether it
+    is closed, whether it carries anything. A hand that a stage does not need sees zeros there. Then which stage it is. A stage is
+    done when all it carries is within `near` of where it is to be, at rest, held where it is lifted and else let go. The last one
+    is the success.
 
     All of these are arrays of numpy. `device` and `threads` are those of RealtimeSim. From a CUDA device the positions and
     velocities of all vertices are copied once an action, and at a reset.
@@ -66,10 +68,15 @@ class FoldTask:
         # By stage and hand, -1 where a hand has nothing to do.
         self._take = np.full((self.stages, len(self.hands)), -1)
         self._lay = np.full_like(self._take, -1)
+        self._height = np.zeros(self._take.shape)  # of what is lifted, else 0 [m]
         for s, stage in enumerate(self.fold.stages):
             for carry in stage:
                 h = self.hands.index(carry.hand)
-                self._take[s, h], self._lay[s, h] = self._vertex(carry.take), self._vertex(carry.lay)
+                self._take[s, h] = self._vertex(carry.take)
+                if isinstance(carry, Lift):
+                    self._height[s, h] = carry.height
+                else:
+                    self._lay[s, h] = self._vertex(carry.lay)
         for hand, home in zip(self.hands, self._homes()):
             # A fingertip that is open: what it should take lies below it.
             self.sim.add_ee(hand, home, size=[0.02, 0.02, 0.02], reach=0.006, collides=False)
@@ -81,6 +88,7 @@ class FoldTask:
         self.lengths = np.zeros(n_envs, int)  # actions of the episodes at hand
         self.stage = np.zeros(n_envs, int)
         self.closed = np.zeros((n_envs, len(self.hands)), bool)
+        self._began = np.zeros((n_envs, len(self.hands), 3))  # where what is to be carried was when the stage began [m]
         self.reset()
 
     # Arrays by hand, (n, hands, ...).
@@ -96,14 +104,20 @@ class FoldTask:
         return self._take[self.stage] >= 0
 
     @property
+    def holds(self):
+        """Whether a hand is to hold what it carries in the stage at hand, not to let it go."""
+        return self._height[self.stage] > 0
+
+    @property
     def take(self):
         """Where the cloth that is to be carried is [m]."""
         return self._at(self._x, self._take)
 
     @property
     def lay(self):
-        """Where the cloth on which it is to lie is [m]."""
-        return self._at(self._x, self._lay)
+        """Where it is to be: where the cloth on which it is to lie is, or above where it lay [m]."""
+        above = self._began + self._height[self.stage][:, :, None] * [0, 0, 1]
+        return np.where(self.holds[:, :, None], above, self._at(self._x, self._lay))
 
     @property
     def carries(self):
@@ -120,6 +134,7 @@ class FoldTask:
             self.lengths[ids] = self.stage[ids] = 0
             self.closed[ids] = False
             self._look()
+            self._began[ids] = self.take[ids]
         return self.observe()
 
     def observe(self):
@@ -133,7 +148,7 @@ class FoldTask:
         """Returns observations, rewards, success, time_out, of the same episodes: who resets them calls reset.
 
         Rewards are minus the distance of a hand from what it is to take, where it does not carry, minus that of this from where
-        it is to lie [m], over all hands that work, and 10 for a stage that is done. An environment that is lost ends as one
+        it is to be [m], over all hands that work, and 10 for a stage that is done. An environment that is lost ends as one
         whose time is up.
         """
         actions = np.clip(arguments.numbers("step: actions", actions, (self.n_envs, self.actions)), -1, 1)
@@ -158,10 +173,12 @@ class FoldTask:
         off_hand = np.linalg.norm(take - self.place, axis=2) * (works & ~carries)
         still = np.linalg.norm(self._at(self._v, self._take), axis=2) * works < self.settings.still
         lost = to_host(self.sim.status()["lost"]) != 0
-        done = (still & (off_goal < self.settings.near)).all(axis=1) & ~carries.any(axis=1) & ~lost
+        done = (still & (off_goal < self.settings.near) & (carries == self.holds)).all(axis=1) & ~lost
         rewards = -np.nan_to_num((off_goal + off_hand).sum(axis=1), nan=1.0) + 10.0 * done
         success = done & (self.stage == self.stages - 1)
-        self.stage[done & ~success] += 1
+        next_stage = done & ~success
+        self.stage[next_stage] += 1
+        self._began[next_stage] = self.take[next_stage]
         time_out = lost | (self.lengths >= self.time_limit) & ~success
         return self.observe(), rewards, success, time_out
 
@@ -208,7 +225,7 @@ APPROACH, GRASP, TRANSPORT = range(3)
 
 class FoldTeacher:
     """The scripted policy of the stages: Approach (above what is to be taken), Grasp (down, close; wait for the other hands),
-    Transport (over in an arc, down, open). Hands that drop something approach again, and so do those beside them."""
+    Transport (over in an arc, down, open; or up, to hold it). Hands that drop something approach again, and so do those beside them."""
 
     hover = 0.05        # above what is to be taken [m]
     horizontal = 0.01   # from it, from where on a hand goes down [m]
@@ -229,7 +246,7 @@ class FoldTeacher:
         self.state[env_ids] = APPROACH
 
     def act(self, task):
-        place, take, lay, carries, works = task.place, task.take, task.lay, task.carries, task.works
+        place, take, lay, carries, works, holds = task.place, task.take, task.lay, task.carries, task.works, task.holds
         new = task.stage != self.stage
         self.stage[:] = task.stage
         dropped = ((self.state == TRANSPORT) & works & ~carries).any(axis=1)
@@ -250,9 +267,9 @@ class FoldTeacher:
         at[transport] = arc[transport]
         at[~works] = place[~works] * [1, 1, 0] + [0, 0, HOME]
         low = place[:, :, 2] - take[:, :, 2] < self.grip + 0.003
-        # All hands let go together.
+        # All hands that let go do so together.
         there = ((left < self.put) & (place[:, :, 2] < 0.04) | ~works).all(axis=1)[:, None]
-        close = works & (grasp & (low | carries) | transport & ~there)
+        close = works & (grasp & (low | carries) | transport & (holds | ~there))
         way = (at - place) / (task.settings.speed * task.settings.steps_per_action * task.sim.time_step)
         way[:, :, :2] /= np.maximum(1, np.abs(way[:, :, :2]).max(axis=2, keepdims=True))
         way[:, :, 2] = np.clip(way[:, :, 2], -1, 1)

@@ -1,6 +1,5 @@
 """Simulations on a CUDA device beside those of the processor, and their arrays in the hands of others."""
 import ctypes
-import json
 
 import numpy as np
 import pytest
@@ -212,26 +211,24 @@ def test_arrays_of_the_processor_go_round(device, scene):
 
 
 @pytest.fixture
-def plain_fold(tmp_path):
+def plain_fold():
     """The towel's, whose layers pass through each other: a device has no self-contact."""
-    scene = json.loads((folds.SCENES / "towel.json").read_text())
-    del scene["self_contact"]
-    scene["objects"]["towel"]["asset"] = str(folds.SCENES / "towel_asset.json")
-    (tmp_path / "plain.json").write_text(json.dumps(scene))
-    return folds.Fold(str(tmp_path / "plain.json"), folds.FOLDS["towel"].stages)
+    return folds.Fold(folds.FOLDS["lift"].scene, folds.FOLDS["towel"].stages)
 
 
-def test_the_teacher_folds_a_towel_on_each_device(plain_fold, device):
-    task = FoldTask(4, FoldSettings(plain_fold, randomization="published", seed=5), device=device)
+@pytest.mark.parametrize("name", ("plain", "lift"))
+def test_the_teacher_folds_and_lifts_a_towel_on_each_device(plain_fold, device, name):
+    fold = plain_fold if name == "plain" else name
+    task = FoldTask(4, FoldSettings(fold, randomization="published", seed=5), device=device)
     assert task.sim.device.startswith(device)
-    teacher, folded = FoldTeacher(task), np.zeros(4, bool)
+    teacher, done = FoldTeacher(task), np.zeros(4, bool)
     for _ in range(task.time_limit):
         observations, _, success, _ = task.step(teacher.act(task))
         assert isinstance(observations, np.ndarray)
-        folded |= success
-        if folded.all():
+        done |= success
+        if done.all():
             break
-    assert folded.all()
+    assert done.all()
 
 
 def test_episodes_of_gymnasium_on_each_device(plain_fold, device):

@@ -55,6 +55,45 @@ def test_stages_follow_each_other():
     assert (seen[0] == [1, 0]).all() and (seen[-1] == [0, 1]).all(axis=1).any()
 
 
+def test_the_teacher_lifts_the_corner_and_holds_it():
+    task = FoldTask(8, FoldSettings("lift", randomization="published", seed=5))
+    starts = task.take[:, 0]
+    assert fold(task, FoldTeacher(task)).all()
+    assert task.carries.all()
+    assert np.abs(task.take[:, 0] - starts - [0, 0, 0.2]).max() < 0.05
+
+
+def test_a_lift_is_done_where_it_is_held_at_rest():
+    """The corner goes by its height, and falls through it, without being there."""
+    task = FoldTask(2, FoldSettings("lift", seed=1))
+    teacher = FoldTeacher(task)
+    while not (teacher.state == tasks.TRANSPORT).all():
+        task.step(teacher.act(task))
+    up, stay = np.array([[0, 0, 1, 1.0]] * 2), np.array([[0, 0, 0, 1.0]] * 2)
+    heights = []
+    while task.take[:, 0, 2].max() < 0.3:
+        rewards, success = task.step(up)[1:3]
+        heights += [task.take[:, 0, 2]]
+        assert not success.any() and np.allclose(rewards, -np.linalg.norm(task.lay - task.take, axis=2)[:, 0])
+    assert np.abs(np.array(heights) - 0.2).min(axis=0).max() < 0.02
+    for _ in range(30):
+        assert not task.step(stay - [0, 0, 0, 2])[2].any()  # let go
+    assert task.take[:, 0, 2].max() < 0.1
+    assert fold(task, teacher).all()  # and taken again: above where it lay at first, not where it fell
+    assert np.linalg.norm(task.lay - task.take, axis=2).max() < task.settings.near
+    rewards, success = task.step(stay)[1:3]
+    assert success.all() and (rewards > 9.9).all()
+
+
+def test_a_lift_may_precede_a_fold():
+    corner = (0, 1)
+    stages = (folds.Lift("hand", corner, 0.1),), (folds.Carry("hand", corner, (1, 0)),)
+    task = FoldTask(2, FoldSettings(folds.Fold(folds.FOLDS["lift"].scene, stages), seed=4))
+    assert task.holds.all()
+    assert fold(task, FoldTeacher(task)).all()
+    assert not task.holds.any() and not task.carries.any()
+
+
 def test_unknown_folds_are_refused():
     with pytest.raises(ValueError, match="fold: found 'sock', expected one of towel, towel_two_arms, tshirt"):
         FoldTask(1, FoldSettings("sock"))
@@ -75,12 +114,14 @@ def test_folds_that_are_none_are_refused():
     for make in (lambda: folds.Carry("a", (-5, 0), (1, 1)), lambda: folds.Carry("a", (0, float("nan")), (1, 1)),
                  lambda: folds.Carry("a", (0, 1), (0, 1)), lambda: folds.Carry(3, (0, 1), (1, 1)),
                  lambda: folds.Carry("a", (0, 1, 0), (1, 1)), lambda: folds.Fold("s", ()), lambda: folds.Fold("s", ((),)),
-                 lambda: folds.Fold("s", (carry,)), lambda: folds.Fold("s", ((carry, folds.Carry("a", (1, 1), (0, 0))),)),
+                 lambda: folds.Lift("a", (0, 2), 0.1), lambda: folds.Lift("", (0, 1), 0.1), lambda: folds.Lift("a", (0, 1), 0),
+                 lambda: folds.Lift("a", (0, 1), float("nan")), lambda: folds.Lift("a", (0, 1), "high"),
+                 lambda: folds.Fold("s", ((carry, folds.Lift("b", (0, 1), 0.1)),)), lambda: folds.Fold("s", (carry,)), lambda: folds.Fold("s", ((carry, folds.Carry("a", (1, 1), (0, 0))),)),
                  lambda: folds.Fold("s", ((carry, folds.Carry("b", (0, 1), (0, 0))),)),
                  lambda: FoldSettings(steps_per_action=-1), lambda: FoldSettings(speed=-1), lambda: FoldSettings(near=float("nan")),
                  lambda: FoldSettings(shift=1e6), lambda: FoldSettings(time_limit=0), lambda: FoldTask(2, "towel"),
                  lambda: FoldTeacher(None)):
-        with pytest.raises((TypeError, ValueError), match="(Carry|Fold|FoldSettings|FoldTask|FoldTeacher): .*found"):
+        with pytest.raises((TypeError, ValueError), match="(Carry|Lift|Fold|FoldSettings|FoldTask|FoldTeacher): .*found"):
             make()
     assert folds.Fold("s", ((carry, other),)).hands == ["a", "b"]
 
