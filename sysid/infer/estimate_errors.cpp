@@ -168,7 +168,8 @@ std::string grasp_text(const HeldParameter& held, double asked, double spread) {
   const auto mm = [](double size) { return data::format_short(std::round(1e5 * size) / 100) + " mm"; };
   const double told = held.nearer(asked < 0 ? 0 : 1, std::abs(asked));
   return "the recordings tell that the grasp holds " + mm(told) + " of the sheet, give or take " +
-         mm(spread * 0.5 * (held.values[1] - held.values[0])) + ": the answer is about that";
+         mm(spread * 0.5 * (held.values[1] - held.values[0])) + ": the answer, simulated at " + mm(held.at) +
+         ", allows for that";
 }
 
 }  // namespace
@@ -186,7 +187,8 @@ void warn_of_held(const Task& task, const std::vector<double>& values, const Mot
       if (errors[e].name == "grasp_size" && held.name == errors[e].name &&
           likelihood.spread_of(e) < kFarBetter)
         warnings.push_back(grasp_text(held, likelihood.asked_of(e), likelihood.spread_of(e)));
-      else if (errors[e].name == held.name && likelihood.spread_of(e) < kFarBetter)
+      else if (errors[e].name == held.name && held.name != "grasp_stiffness" &&
+               likelihood.spread_of(e) < kFarBetter)
         warnings.push_back(held.name +
                            (task.grid.deviations.contains(held.name)
                                 ? " is told by the recordings far better than was stated"

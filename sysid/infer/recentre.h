@@ -13,8 +13,9 @@ namespace flash::sysid {
 std::optional<double> told_grasp_size(const Task& task, const Found& found);
 
 /// What was found, about the size of the grasp that the recordings tell: a lattice is simulated anew about
-/// another size until it is near. `grid`: that of the task, of which the centres change; `held`: errors by
-/// what is held, of the last lattice, and those of the cells.
+/// another size until it is near, as long as that leads nearer to what was observed. `grid`: that of the
+/// task, of which the centres change; `held`: errors by what is held, of the last lattice, and those of the
+/// cells.
 Found about_told_grasp(const Task& task, Found found, GridSettings& grid, std::vector<KnownError>& held);
 
 }  // namespace flash::sysid
